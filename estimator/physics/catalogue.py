@@ -136,6 +136,11 @@ def effect_problems(
         for key, entry_value in values.items()
         if entry_value.tolerance > 0 and entry_value.value == 0
     ]
+    problems += [
+        f"effects.{name}.{key}.ci95: expected two numbers, the lower one first, got {list(entry_value.ci95)}"
+        for key, entry_value in values.items()
+        if entry_value.ci95 is not None and not entry_value.ci95[0] <= entry_value.ci95[1]
+    ]
     return problems + _limit_problems(entry, values)
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 from estimator.physics.driveline import UNITS, Driveline, Motion, Structure, unit
 from estimator.signals.record import OutputKind, Record
@@ -36,15 +36,29 @@ class Place(Enum):
     LOAD = "load"
     LOAD_ANGLE = "load_angle"
     RECORDED_ANGLE = "recorded_angle"
+    SHAFT = "shaft"
     SHAFT_LOSS = "shaft_loss"
+
+
+class Around(NamedTuple):
+    """What a law with a state is given of the line that it is in."""
+
+    stiffness: float  # of the first shaft [Nm/rad]
+    fastest: float  # decay that the step can follow [1/s]
+    stiffest: float  # spring that the step can follow [Nm/rad]
 
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """A law at a place: it takes all parameters of its entry, in their order, behind what the place gives."""
+    """A law at a place: it takes all parameters of its entry, in their order, behind what the place gives.
+
+    One with a state gives the state's rate, too: both functions then get, between the two, the state and an `Around`.
+    The state is 0 where a simulation begins.
+    """
 
     place: Place  # where along the line
     law: Callable[..., Any]  # compiled; returns a torque [Nm] or what the place says
+    rate: Callable[..., Any] | None = None  # compiled; returns the rate of the law's state [1/s times its unit]
 
 
 class Element(Enum):
@@ -180,7 +194,7 @@ class Effect:
     """Values for `hil sim` and pictures, in the parameters' units."""
     scales: Scales = lambda _model, _records: (1.0,)
     """Typical size of the parameters in these recordings, in their units."""
-    starts: Starts = lambda _model, _records: []  # where fits start, in scales; none: at one scale each
+    starts: Starts = lambda _model, _records: []  # where fits start, in scales; none of what is recognised
     testable: Testable = lambda _model, _records: None  # None, or why these recordings cannot show it
     kinds: frozenset[OutputKind] = frozenset(OutputKind)  # measured outputs it makes sense with
     profile: bool = False

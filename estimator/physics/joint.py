@@ -11,9 +11,11 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.identification.modes.modes import Mode
 from estimator.physics.curve import curve
-from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate
+from estimator.physics.effect import Around
+from estimator.physics.effects.shaft import SHAFT_HYSTERESIS, damping_share, loaded_twist, slider_law, slider_rate
 from estimator.physics.kernel import slots, state_vector
 from estimator.physics.laws import beyond_gap, share_inside
+from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import FloatArray, Record
@@ -21,6 +23,8 @@ from estimator.signals.record import FloatArray, Record
 TWIST = 2  # place of phi in the state [w_M, w_L, phi, T_L]
 
 TORQUE = -1  # the output that a joint has next to the kernel's states: the torque it carries
+
+SLIDER = tuple(slot(SHAFT_HYSTERESIS.name, each.name) for each in SHAFT_HYSTERESIS.parameters)  # places of its law's
 
 PART_OF_TORQUE, MOST_SECANTS = 1e-12, 100
 """How near the balance inside an open gap is found, as part of the torques at its ends, and by how many secants."""
@@ -236,20 +240,26 @@ def behind_gap(twist: float, before: float, loading: float, stiffness: float, pr
 
 
 @compiled
+def slider(p: FloatArray) -> tuple[float, float, float, float, float]:
+    """Return the parameters of the slider inside the shaft, in the order of its law."""
+    return p[SLIDER[0]], p[SLIDER[1]], p[SLIDER[2]], p[SLIDER[3]], p[SLIDER[4]]
+
+
+@compiled
 def slid(loading: float, change: float, p: FloatArray) -> float:
     """Return a slider's loading after a change of its twist [rad], however fast: Runge-Kutta steps over the twist."""
-    if p[slots.SLIDER] == 0.0 or change == 0.0:
+    if p[SLIDER[0]] == 0.0 or change == 0.0:
         return loading
-    sharpness, unloading = float(p[slots.SHARPNESS]), float(p[slots.UNLOADING])
-    towards = math.copysign(1.0, change)
-    way = min(abs(change) / float(p[slots.YIELD]), FARTHEST)
-    steps = math.ceil(way * max(sharpness, 1.0) / PART_OF_YIELD)
+    law, around = slider(p), Around(0.0, math.inf, math.inf)
+    towards = math.copysign(law[1], change)  # the twist over which it yields, in a unit of time
+    way = min(abs(change) / law[1], FARTHEST)
+    steps = math.ceil(way * max(law[2], 1.0) / PART_OF_YIELD)
     h = way / steps
     for _ in range(steps):
-        first = loading_rate(loading, towards, sharpness, unloading, math.inf)
-        second = loading_rate(loading + 0.5 * h * first, towards, sharpness, unloading, math.inf)
-        third = loading_rate(loading + 0.5 * h * second, towards, sharpness, unloading, math.inf)
-        fourth = loading_rate(loading + h * third, towards, sharpness, unloading, math.inf)
+        first = slider_rate(0.0, towards, loading, around, *law)
+        second = slider_rate(0.0, towards, loading + 0.5 * h * first, around, *law)
+        third = slider_rate(0.0, towards, loading + 0.5 * h * second, around, *law)
+        fourth = slider_rate(0.0, towards, loading + h * third, around, *law)
         loading += h * (first + 2.0 * second + 2.0 * third + fourth) / 6.0
     return loading
 
@@ -257,9 +267,8 @@ def slid(loading: float, change: float, p: FloatArray) -> float:
 @compiled
 def carried(inside: float, loading: float, stiffness: float, preload: float, p: FloatArray) -> float:
     """Return the torque of spring and slider, less the preload [Nm]."""
-    if p[slots.SLIDER_INSIDE] > 0.0:
-        stiffness = max(stiffness - float(p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD]), 0.0)
     if p[slots.TABLE_TWIST] > 0.0:
         preload = preload - curve(inside, p, slots.TABLE_TWIST, False)[0]
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
-    return stiffness * loaded_twist(inside, *law) + float(p[slots.SLIDER]) * loading - preload
+    held = slider_law(inside, 0.0, loading, Around(stiffness, math.inf, math.inf), *slider(p))
+    return stiffness * loaded_twist(inside, *law) + held - preload

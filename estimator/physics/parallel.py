@@ -125,11 +125,6 @@ def work_on(cores: int) -> None:
     _cores = _Cores(cores)
 
 
-def in_turn(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Do the same one after the other: each item has all the room, and all cores for what is shared out inside."""
-    return [function(item) for item in items]
-
-
 def concurrently(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     """Return ``function`` of each item, in order; the first error ends the rest."""
     cores, todo, results = _cores, deque(enumerate(items)), dict[int, Result]()

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from estimator import lanes
-from estimator.physics.kernel.conditions import SUMS, Sum
 from estimator.physics.kernel.rates import under_own
 from estimator.signals.record import FloatArray
 
@@ -62,7 +61,7 @@ def fields(kind: Type) -> dict[str, Type]:
     """Return names and types of what a NamedTuple or several values hold."""
     if is_record(kind):
         hints = typing.get_type_hints(kind)
-        return {name: hints[name] for name in kind._fields if hints[name] != OF_ANY}
+        return {name: of_hint(hints[name]) for name in kind._fields if hints[name] != OF_ANY}
     return {f"item{i}": each for i, each in enumerate(kind)}
 
 
@@ -98,8 +97,6 @@ class Translation:
 
     def function(self, function: Callable[..., Any], of_one_number: bool = False) -> tuple[str, Type]:
         """Translate a function, where it has not been, and return its name in C and the type it returns."""
-        if function in SUMS:
-            return self._sum(SUMS[function])
         source = getattr(function, "py_func", function)
         if source not in self._names:
             module = source.__module__.rsplit(".", 1)[-1]
@@ -108,21 +105,6 @@ class Translation:
             self._names[source] = name, translated.returned
             self._functions.append(translated.c())
         return self._names[source]
-
-    def _sum(self, of: Sum) -> tuple[str, Type]:
-        """Write a sum of laws, where it has not been."""
-        if of not in self._names:
-            given = [f"given{i}" for i in range(of.given)]
-            terms = [
-                f"{self.function(law)[0]}({', '.join([*given, *(f'p.at[{place}]' for place in places)])})"
-                for law, places in of.terms
-            ]
-            name = f"laws_{of.place.name.lower()}"
-            arguments = ", ".join([*(f"double {each}" for each in given), "Array p"])
-            total = " + ".join(["0.0", *terms])
-            self._functions.append(f"static double {name}({arguments}) {{\n{INDENT}return {total};\n}}\n")
-            self._names[of] = name, float
-        return self._names[of]
 
     def structure(self, kind: Type) -> None:
         """Define a structure, and those in it, where they have not been."""

@@ -77,7 +77,7 @@ def test_the_example_runs_as_printed(extended: Path, number: int) -> None:
 
 def test_the_copy_is_what_runs(extended: Path) -> None:
     """Without this the examples might be tried on the installed packages, which lack them."""
-    program = "import estimator.physics.catalogue as c; print(c.__file__); print('pump_drag' in c.EFFECTS)"
+    program = "import estimator.physics.catalogue as c; print(c.__file__); print('rubber_memory' in c.EFFECTS)"
     done = subprocess.run([sys.executable, "-c", program], cwd=extended, capture_output=True, text=True, check=True)
     file, known = done.stdout.splitlines()
     assert Path(file).is_relative_to(extended)
@@ -87,4 +87,4 @@ def test_the_copy_is_what_runs(extended: Path) -> None:
 def test_the_shipped_catalogue_has_not_been_touched() -> None:
     from estimator.physics.catalogue import EFFECTS
 
-    assert "pump_drag" not in EFFECTS
+    assert "rubber_memory" not in EFFECTS

@@ -12,12 +12,15 @@ from estimator.physics.effect import (
     MOMENTS,
     WITH_SHAFT,
     WITH_SPRING,
+    Acting,
+    Around,
     Effect,
     EffectParameter,
     Element,
     FitStart,
     Held,
     OtherForm,
+    Place,
     Span,
     Step,
     Untestable,
@@ -258,6 +261,39 @@ def loading_rate(loading: float, rate: float, sharpness: float, unloading: float
     return pace * math.copysign(1.0 - yielded, rate)
 
 
+@compiled
+def slider_law(
+    twist: float,
+    rate: float,
+    loading: float,
+    around: Around,
+    friction: float,
+    yields: float,
+    sharpness: float,
+    unloading: float,
+    inside: float,
+) -> float:
+    """Return the torque of a slider that is loaded from -1 to 1, less what it takes of the shaft's own spring [Nm]."""
+    return friction * loading - min(inside * friction / yields, around.stiffness) * twist
+
+
+@compiled
+def slider_rate(
+    twist: float,
+    rate: float,
+    loading: float,
+    around: Around,
+    friction: float,
+    yields: float,
+    sharpness: float,
+    unloading: float,
+    inside: float,
+) -> float:
+    """Return how fast it loads [1/s]; it yields over no shorter a twist than the step can follow."""
+    over = max(yields, friction / around.stiffest)
+    return loading_rate(loading, rate / over, sharpness, unloading, around.fastest)
+
+
 def slider_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, a fiftieth of the twist that it gives, and 1 for the shape."""
     torque = torque_scale(records)
@@ -285,6 +321,7 @@ SHAFT_HYSTERESIS = Effect(
         EffectParameter("unloading", "", 1.0, 0.0, 1.0, "stiffness on the way back: u", True, most=1.0),
         EffectParameter("inside", "", 0.0, 0.0, 1.0, "part of its stiffness that k holds: m", True, most=1.0),
     ),
+    acting=Acting(Place.SHAFT, slider_law, slider_rate),
     structures=WITH_SPRING,
     resembles=("coulomb_friction_motor", "backlash", "stiffness_nonlinearity"),
     scales=slider_scales,
@@ -298,9 +335,15 @@ SHAFT_HYSTERESIS = Effect(
 
 
 @compiled
-def relaxing_rate(torque: float, rate: float, stiffness: float, fastest: float, relaxation_s: float) -> float:
-    """Return how fast the branch's torque changes [Nm/s], at a rate of the twist [rad/s]."""
-    return (stiffness * relaxation_s * rate - torque) * min(1.0 / relaxation_s, fastest)
+def relaxing_law(twist: float, rate: float, torque: float, around: Around, share: float, relaxation_s: float) -> float:
+    """Return the torque of the branch, which is its state [Nm]."""
+    return torque
+
+
+@compiled
+def relaxing_rate(twist: float, rate: float, torque: float, around: Around, share: float, relaxation_s: float) -> float:
+    """Return how fast it changes [Nm/s]; no faster than the step can follow."""
+    return (share * around.stiffness * relaxation_s * rate - torque) * min(1.0 / relaxation_s, around.fastest)
 
 
 def relaxation_described(
@@ -326,6 +369,7 @@ VISCOELASTIC_SHAFT = Effect(
         EffectParameter("relaxation_s", "s", 1.0, 0.05, 20.0, "time in which its torque relaxes: tau"),
     ),
     example={"branch_share": 0.4, "relaxation_s": 0.02},
+    acting=Acting(Place.SHAFT, relaxing_law, relaxing_rate),
     structures=WITH_SHAFT,
     resembles=("extra_torsional_mode", "shaft_hysteresis", "stiffness_nonlinearity", "actuator_lag"),
     widens=frozenset({"k", "c"}),  # the branch stiffens the line and damps it

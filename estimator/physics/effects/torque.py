@@ -238,15 +238,18 @@ def nonlinearity_testable(model: Driveline, records: Sequence[Record]) -> Untest
 
 
 def nonlinearity_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """State how far the torque is off at 100 Nm either way."""
+    """State for how much torque, either way, the reading is off by a hundredth more."""
     loss, tilt = values["curvature_per_nm"], values["asymmetry_per_nm"]
-    torque = unit("torque", motion)
+
+    def off(share_per_torque: float) -> str:
+        if share_per_torque == 0.0:
+            return "is its reading"
+        how = "falls short of" if share_per_torque > 0.0 else "exceeds"
+        return f"{how} its reading by 1 % for each {0.01 / abs(share_per_torque):.3g} {unit('torque', motion)}"
+
     if tilt == 0.0:
-        return f"the true torque differs from its reading by {-100.0 * loss:+.2%} at 100 {torque}"
-    return (
-        f"the true torque differs from its reading by {-100.0 * (loss + tilt):+.2%} at 100 {torque} and by "
-        f"{-100.0 * (loss - tilt):+.2%} at -100 {torque}"
-    )
+        return f"the true torque {off(loss)}"
+    return f"the true torque {off(loss + tilt)} where it is positive, and {off(loss - tilt)} where it is negative"
 
 
 TORQUE_NONLINEARITY = Effect(

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from estimator.compiled import assembled, inlined
+from estimator.compiled import inlined
 from estimator.lanes import broadcast_as, choose, every, some
 from estimator.physics.catalogue import BUILT_IN, KERNEL
 from estimator.physics.curve import curve, wrapped
-from estimator.physics.effect import Place
 from estimator.physics.effects.drag import cold_part
 from estimator.physics.effects.inertia import frequency_within
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.laws_at import has_states, over_recorded_angle
 from estimator.physics.kernel.state_vector import Bristles, Conditions, State, Tyre
 from estimator.physics.laws import LEAST, fading, inertia_while, overtoned_wave, share_inside, wave
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
-
-SUMS: dict[Total, Sum] = {}
-"""Of each function that is put together here, for who has to write it in another language."""
 
 STICK_STABILITY = 1.5
 """Runge-Kutta is stable to h * slope / J = 2.78; friction's slope at standstill is held to about half of it."""
@@ -52,8 +48,7 @@ class Line(NamedTuple):
 
     masses: int  # 1, 2 or 3
     elastic: bool  # whether the first shaft is a spring and a damper, and no law next to them
-    sliding: bool  # whether there may be a slider inside that shaft
-    extended: bool  # whether it has states beyond those of its masses and a slider
+    extended: bool  # whether it has states beyond those of its masses
     own: tuple[Any, ...]  # the user's laws: compiled functions and the places of their parameters; () without
 
 
@@ -61,10 +56,9 @@ class Line(NamedTuple):
 def is_elastic(p: FloatArray) -> bool:
     """Tell whether the first shaft is a spring and a damper, and no law next to them."""
     bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
-    sliding = p[slots.SLIDER] != 0.0 or p[slots.SLIDER_INSIDE] > 0.0
     jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
     tabled = p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0
-    return not (bent or sliding or jointed or tabled)
+    return not (bent or jointed or tabled)
 
 
 @inlined
@@ -87,75 +81,14 @@ def is_bristled_at_load(p: FloatArray) -> bool:
 
 @inlined
 def is_extended(p: FloatArray) -> bool:
-    """Tell whether a line has states beyond those of its masses and a slider."""
-    return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0 or p[slots.RELAXING] > 0.0)
+    """Tell whether a line has states beyond those of its masses."""
+    return bool(p[slots.BRANCH_INERTIA] > 0.0 or is_within(p) or p[slots.SLIP] > 0.0 or has_states(p))
 
 
 @inlined
 def is_within(p: FloatArray) -> bool:
     """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not next to it."""
     return some(p[slots.BETWEEN] > 0.0) or some(p[slots.BEHIND] > 0.0)
-
-
-Total = Callable[..., float]
-"""What the place gives, and parameters of the superset model, to the sum of the place's laws [Nm]."""
-
-
-Term = tuple[Callable[..., float], tuple[int, ...]]
-"""A law, and the places of its parameters."""
-
-
-class Sum(NamedTuple):
-    """What a function that is put together adds up: laws of a place, which are given one quantity or two."""
-
-    place: Place  # where the laws act
-    given: int  # quantities that each law gets: 1 or 2
-    terms: tuple[Term, ...]  # each law and its parameters' places
-
-
-def parameters_at(places: Sequence[int]) -> Callable[..., Any]:
-    """Return the compiled function that takes these places out of the parameters, as a tuple."""
-    first, rest = places[0], places[1:]
-    if not rest:
-        return assembled(lambda p: (p[first],))
-    others = parameters_at(rest)
-    return assembled(lambda p: (p[first], *others(p)))
-
-
-def with_law(before: Total, law: Callable[..., float], values: Callable[..., Any], given: int) -> Total:
-    """Return the sum of a function and a law, of as many quantities as are ``given``."""
-    if given == 1:
-        return assembled(lambda x, p: before(x, p) + law(x, *values(p)))
-    return assembled(lambda x, y, p: before(x, y, p) + law(x, y, *values(p)))
-
-
-def total(place: Place, given: int = 1) -> Total:
-    """Put together the sum of the catalogue's laws at a place, as one compiled function of one quantity or two."""
-    if given == 1:
-        summed: Total = assembled(lambda x, p: broadcast_as(0.0, x))
-    else:
-        summed = assembled(lambda x, y, p: broadcast_as(0.0, x))
-    terms = terms_of(place)
-    for law, places in terms:
-        summed = with_law(summed, law, parameters_at(places), given)
-    SUMS[summed] = Sum(place, given, terms)
-    return summed
-
-
-def terms_of(place: Place) -> tuple[Term, ...]:
-    """Return the laws of a place, each with the places of its parameters in the kernel's vector."""
-    return tuple(
-        (entry.acting.law, tuple(slot(entry.name, parameter.name) for parameter in entry.parameters))
-        for entry in BUILT_IN.values()
-        if entry.acting is not None and entry.acting.place is place
-    )
-
-
-motor_drag = total(Place.MOTOR)
-load_drag = total(Place.LOAD)
-held_by_angle = total(Place.LOAD_ANGLE)
-over_recorded_angle = total(Place.RECORDED_ANGLE)
-shaft_loss = total(Place.SHAFT_LOSS, given=2)
 
 
 @inlined
@@ -237,11 +170,6 @@ def conditions(
     if is_within(p):
         lightest = min(lightest, branch_inertia(p))
     stiffness = p[slots.K] * line_share(p) * (1.0 + cracked * p[slots.CRACK])
-    inverse_yield = 0.0
-    if some(p[slots.SLIDER] != 0.0):
-        inverse_yield = 1.0 / max(p[slots.YIELD], p[slots.SLIDER] / (fastest * fastest * lightest))
-        if some(p[slots.SLIDER_INSIDE] > 0.0):
-            stiffness = max(stiffness - p[slots.SLIDER_INSIDE] * p[slots.SLIDER] / p[slots.YIELD], 0.0)
     return Conditions(
         ripple,
         load,
@@ -268,7 +196,7 @@ def conditions(
         branch_inertia(p),
         branch_frequency(p),
         fastest,
-        inverse_yield,
+        fastest * fastest * lightest,
         tyre(inertia_load, fastest, p),
     )
 
@@ -328,7 +256,7 @@ def with_friction(
         now.branch_inertia,
         now.branch_frequency,
         now.fastest,
-        now.inverse_yield,
+        now.stiffest,
         now.tyre,
     )
 

@@ -47,6 +47,7 @@ from estimator.physics.kernel.state_vector import (
     Conditions,
     State,
     corrected,
+    pack,
     unpacked,
 )
 from estimator.signals.record import FloatArray, IntArray
@@ -137,11 +138,9 @@ def _for_its_states(
     masses: int, elastic: bool, own: tuple[Any, ...], made: CompiledIntegrator, p: FloatArray, given: tuple[Any, ...]
 ) -> None:
     if is_extended(p):
-        made(Line(masses, elastic, not elastic, True, own), *given)
-    elif not elastic and p[slots.SLIDER] != 0.0:
-        made(Line(masses, elastic, True, False, own), *given)
+        made(Line(masses, elastic, True, own), *given)
     else:
-        made(Line(masses, elastic, False, False, own), *given)
+        made(Line(masses, elastic, False, own), *given)
 
 
 @inlined
@@ -212,7 +211,7 @@ def next_state_with_friction(
 
 
 @inlined
-def integrate_made(  # noqa: C901  # one question more than usual, and a change costs each user a minute
+def integrate_made(  # one question more than usual, and a change costs each user a minute
     line: Line,
     sample_time_s: float,
     substeps: int,
@@ -283,8 +282,7 @@ def integrate_made(  # noqa: C901  # one question more than usual, and a change 
             if steep and j == 0:
                 slopes[1, k] = slope
     leave_slope(last, slope, slopes)
-    for i, entry_now in enumerate(x):
-        state[i] = entry_now
+    pack(x, state)
     state[LAGGED], state[LAG_RISE] = lagged, lag_rise
     state[FILTERED], state[FILTER_RISE] = filtered, filter_rise
     state[BRISTLES_MOTOR], state[BRISTLES_LOAD] = bristles.motor, bristles.load

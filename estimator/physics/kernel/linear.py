@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +11,33 @@ from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import Line, is_bristled, is_bristled_at_motor, with_friction, with_torques
+from estimator.physics.kernel.laws_at import no_states
 from estimator.physics.kernel.rates import advanced, dry_at_load, runge_kutta, stepped
-from estimator.physics.kernel.state_vector import Conditions, State
+from estimator.physics.kernel.state_vector import (
+    ANGLE,
+    BRANCH_SPEED,
+    BRANCH_TWIST,
+    FIRST_LAW,
+    LAW_STATES,
+    LOAD_SPEED,
+    MIDDLE_SPEED,
+    MIDDLE_TWIST,
+    SPEED,
+    STATES,
+    TWIST,
+    Conditions,
+    State,
+    unpacked,
+)
+from estimator.physics.kernel.written import several, written
 from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
 from estimator.physics.tables import TABLES
 from estimator.signals.record import FloatArray
 
 FED_OR_LOADED = ("table_torque", "table_load_angle")  # curves that change a torque from outside, and no line
+
+NONE = -1  # no entry of the state
 
 WORTHWHILE_SAMPLES = 50  # samples from which on reading the answers takes less time than they save
 
@@ -27,8 +47,6 @@ BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHER
 NULLS = np.array([parameter.null for _, parameter in _OTHERS])
 """Where the parameters of all effects stand that leave no line linear, and what each is where its effect is not there:
 with one of them a line takes its sub-steps."""
-
-AT_REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class StepResponses(NamedTuple):
@@ -42,10 +60,10 @@ class StepResponses(NamedTuple):
     branch_speed: State  # ... and speed
     middle_twist: State  # ... of the second shaft's twist
     middle_speed: State  # ... of the middle mass's speed
-    relaxing: State  # ... of the relaxing torque
     torque: State  # to 1 Nm at the motor over the whole step
     rise: State  # to a torque that rises from 0 to 1 Nm over the step
     load: State  # to 1 Nm at the load over the whole step
+    law_states: tuple[State, ...]  # to a unit of each law's own state
 
 
 @inlined
@@ -87,21 +105,11 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 
 @inlined
 def unit(entry: int) -> State:
-    """Return the state whose entry of this number is 1 and whose others are 0."""
-    return State(
-        1.0 if entry == 0 else 0.0,
-        1.0 if entry == 1 else 0.0,
-        1.0 if entry == 2 else 0.0,
-        1.0 if entry == 3 else 0.0,
-        0.0,
-        0.0,
-        1.0 if entry == 6 else 0.0,
-        1.0 if entry == 7 else 0.0,
-        1.0 if entry == 8 else 0.0,
-        1.0 if entry == 9 else 0.0,
-        0.0,
-        1.0 if entry == 11 else 0.0,
-    )
+    """Return the state whose entry of this number is 1 and whose others are 0; no entry: that at rest."""
+    state = np.zeros(STATES)
+    if entry >= 0:
+        state[entry] = 1.0
+    return unpacked(state)
 
 
 @compiled
@@ -110,18 +118,18 @@ def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) ->
     now = with_friction(now, 0.0, 0.0, 0.0, 0.0, 0.0)
     pulled = with_torques(now, 0.0, 1.0)
     return StepResponses(
-        after(line, now, 0.0, 0.0, unit(0), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(1), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(2), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(3), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(6), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(7), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(8), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(9), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(11), p, h, steps),
-        after(line, now, 1.0, 0.0, AT_REST, p, h, steps),
-        after(line, now, 0.0, 1.0, AT_REST, p, h, steps),
-        after(line, pulled, 0.0, 0.0, AT_REST, p, h, steps),
+        after(line, now, 0.0, 0.0, unit(ANGLE), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(SPEED), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(TWIST), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(LOAD_SPEED), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(BRANCH_TWIST), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(BRANCH_SPEED), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(MIDDLE_TWIST), p, h, steps),
+        after(line, now, 0.0, 0.0, unit(MIDDLE_SPEED), p, h, steps),
+        after(line, now, 1.0, 0.0, unit(NONE), p, h, steps),
+        after(line, now, 0.0, 1.0, unit(NONE), p, h, steps),
+        after(line, pulled, 0.0, 0.0, unit(NONE), p, h, steps),
+        of_law_states(line, now, p, h, steps),
     )
 
 
@@ -133,6 +141,16 @@ def after(
     for _ in range(steps):
         x = runge_kutta(line, now, torque, rise, x, p, h)
     return x
+
+
+of_law_states: Callable[..., tuple[State, ...]] = written(
+    "of_law_states",
+    {"line": Line, "now": Conditions, "p": FloatArray, "h": float, "steps": int},
+    tuple[State, ...],
+    [f"return {several(f'after(line, now, 0.0, 0.0, unit({FIRST_LAW + i}), p, h, steps)' for i in range(LAW_STATES))}"],
+    {"__name__": __name__, "after": after, "unit": unit},
+)
+"""What ``steps`` sub-steps of ``h`` [s] make of a unit of each law's own state."""
 
 
 @inlined
@@ -165,7 +183,7 @@ def answered(
     if now.dry_motor != 0.0:
         torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
     load = now.load + dry_at_load(carried, now)
-    after = State(0.0, 0.0, 0.0, 0.0, x.loading, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, 0.0)
+    after = State(0.0, 0.0, 0.0, 0.0, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, no_states(0.0))
     after = advanced(line, after, to.torque, torque)
     after = advanced(line, after, to.load, load)
     if rise != 0.0:
@@ -181,5 +199,6 @@ def answered(
     if line.extended:
         after = advanced(line, after, to.branch_twist, x.branch_twist)
         after = advanced(line, after, to.branch_speed, x.branch_speed)
-        after = advanced(line, after, to.relaxing, x.relaxing)
+        for i in range(LAW_STATES):
+            after = advanced(line, after, to.law_states[i], x.law_states[i])
     return after

@@ -8,20 +8,29 @@ from estimator.compiled import inlined
 from estimator.lanes import broadcast_as, choose, every, some
 from estimator.lanes.types import overload
 from estimator.physics.curve import curve
+from estimator.physics.effect import Around
 from estimator.physics.effects.dry_friction import stribeck_law
 from estimator.physics.effects.load import build_up, carcass, coupling, gripped
-from estimator.physics.effects.shaft import damping_share, loaded_twist, loading_rate, pressed, relaxing_rate
+from estimator.physics.effects.shaft import damping_share, loaded_twist, pressed
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import (
     Line,
-    held_by_angle,
     is_within,
     line_share,
-    load_drag,
-    motor_drag,
-    shaft_loss,
     with_torque,
     with_torques,
+)
+from estimator.physics.kernel.laws_at import (
+    held_by_angle,
+    load_drag,
+    load_memory,
+    motor_drag,
+    motor_memory,
+    moved_states,
+    no_states,
+    shaft_loss,
+    shaft_memory,
+    state_rates,
 )
 from estimator.physics.kernel.sensing import entry
 from estimator.physics.kernel.state_vector import SHAFT_TORQUE, Conditions, State
@@ -40,7 +49,7 @@ def at_moment(line: Line, time_s: float, k: int) -> Line:
     if len(line.own) == 0:
         return line
     readings, forces = line.own[0], line.own[1]
-    return Line(line.masses, line.elastic, line.sliding, line.extended, (readings, forces, time_s, readings[k]))
+    return Line(line.masses, line.elastic, line.extended, (readings, forces, time_s, readings[k]))
 
 
 @overload(at_moment, strict=False)
@@ -83,6 +92,12 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
 
 
 @inlined
+def around(now: Conditions) -> Around:
+    """Return what a law with a state is given of the line."""
+    return Around(now.stiffness, now.fastest, now.stiffest)
+
+
+@inlined
 def damping_torque(rate: float, p: FloatArray) -> float:
     """Return the torque of the shaft's damper [Nm] at the rate of its twist [rad/s]."""
     share = line_share(p)
@@ -90,8 +105,8 @@ def damping_torque(rate: float, p: FloatArray) -> float:
 
 
 @inlined
-def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiffness: float) -> float:
-    """Return the torque the shaft carries [Nm] at a twist [rad], its rate [rad/s] and the hysteresis' loading [-]."""
+def shaft_torque(line: Line, twist: float, rate: float, now: Conditions, x: State, p: FloatArray) -> float:
+    """Return the torque the shaft carries [Nm] at a twist [rad] and its rate [rad/s]."""
     damping = damping_torque(rate, p)
     across = broadcast_as(0.0, damping)
     held = broadcast_as(0.0, damping)
@@ -106,8 +121,9 @@ def shaft_torque(twist: float, rate: float, loading: float, p: FloatArray, stiff
         across = damping * p[slots.ACROSS]
         damping = (damping - across) * damping_share(loaded, p[slots.CONTACT])
     law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
-    elastic = stiffness * loaded_twist(loaded, *law)
-    torque = float(elastic) + damping + float(p[slots.SLIDER]) * loading
+    torque = float(now.stiffness * loaded_twist(loaded, *law)) + damping
+    if line.extended:
+        torque += shaft_memory(loaded, rate, x.law_states, around(now), p)
     return held + (torque if closed else pressed(torque, loaded, p[slots.PULL]) + across)
 
 
@@ -116,9 +132,11 @@ def shaft_torques(line: Line, rate: float, now: Conditions, x: State, p: FloatAr
     """Return the torque the first shaft passes on to the load, and the one it takes from the motor [Nm]."""
     if line.elastic:
         shaft = now.stiffness * x.twist + damping_torque(rate, p)
+        if line.extended:
+            shaft += shaft_memory(x.twist, rate, x.law_states, around(now), p)
         return shaft, shaft
     joint_rate = now.joint_rate * x.speed
-    shaft = shaft_torque(x.twist + now.joint_angle, rate + joint_rate, x.loading, p, now.stiffness)
+    shaft = shaft_torque(line, x.twist + now.joint_angle, rate + joint_rate, now, x, p)
     shaft = shaft * now.shaft_factor + now.shaft_extra
     return shaft, shaft * (1.0 + now.joint_rate)  # a joint that turns unevenly passes on power, not torque
 
@@ -146,8 +164,7 @@ def twist_rate(line: Line, x: State, p: FloatArray) -> float:
 def read_out(line: Line, now: Conditions, x: State, output: int, p: FloatArray) -> float:
     """Return an output: of the state, or the torque that the shaft passes on [Nm]."""
     if line.masses > 1 and output == SHAFT_TORQUE:
-        shaft = shaft_torques(line, twist_rate(line, x, p), now, x, p)[0]
-        return shaft + x.relaxing if line.extended else shaft
+        return shaft_torques(line, twist_rate(line, x, p), now, x, p)[0]
     return entry(x, output, p)
 
 
@@ -156,8 +173,14 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
     """Return the time derivative of the mechanical state under the conditions ``now``."""
     now = under_own(now, line, x, p)
     drive = now.torque - motor_friction(x.speed, p, now.width_motor, now.dry_motor)
+    states = no_states(x.speed)
+    if line.extended:
+        drive -= motor_memory(x.speed, x.law_states, around(now), p)
     if line.masses == 1:
         drag = load_friction(x.speed, x.speed, now, p) + now.load + held_by_angle(x.angle, p)
+        if line.extended:
+            drag += load_memory(x.speed, x.law_states, around(now), p)
+            states = state_rates(x.speed, x.speed, x.twist, broadcast_as(0.0, x.speed), x.law_states, around(now), p)
         branch = branch_rate(x.branch_twist, x.speed - x.branch_speed, now, p) if line.extended else 0.0
         acceleration = (drive - now.branch_inertia * branch - drag) * now.inverse_motor
         still = broadcast_as(0.0, x.speed)
@@ -168,25 +191,21 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
             still,
             still,
             still,
-            still,
             own_rate,
             broadcast_as(branch, x.speed),
             still,
             still,
             still,
-            still,
+            states,
         )
     between, behind = within(line, p)
     own_rate = x.branch_speed - driven(line, x) if behind else x.speed - x.branch_speed
     rate = twist_rate(line, x, p)
     shaft, reaction = shaft_torques(line, rate, now, x, p)
-    branch, relaxing = broadcast_as(0.0, x.speed), broadcast_as(0.0, x.speed)
-    if line.extended and some(p[slots.RELAXING] > 0.0):
-        shaft, reaction = shaft + x.relaxing, reaction + x.relaxing
-        stiffness = p[slots.RELAXING] * p[slots.K]
-        relaxing = relaxing_rate(x.relaxing, rate, stiffness, now.fastest, p[slots.RELAXATION_TIME])
+    branch = broadcast_as(0.0, x.speed)
     pull = shaft
     if line.extended:
+        states = state_rates(x.speed, x.load_speed, x.twist, rate, x.law_states, around(now), p)
         branch = branch_rate(x.branch_twist, own_rate, now, p)
         own = now.branch_inertia * branch
         if behind:
@@ -207,24 +226,14 @@ def rates(line: Line, now: Conditions, x: State, p: FloatArray) -> State:
         (drive - reaction) * now.inverse_motor,
         rate,
         load,
-        broadcast_as(sliding(x.loading, rate, now, p) if line.sliding else 0.0, x.speed),
         vehicle,
         own_rate,
         branch,
         middle_twist,
         middle_speed,
         traction,
-        relaxing,
+        states,
     )
-
-
-@inlined
-def sliding(loading: float, rate: float, now: Conditions, p: FloatArray) -> float:
-    """Return how fast the slider inside the shaft loads [1/s]; 0 where there is none."""
-    if every(p[slots.SLIDER] == 0.0):
-        return 0.0
-    sharpness, unloading = p[slots.SHARPNESS], p[slots.UNLOADING]
-    return loading_rate(loading, rate * now.inverse_yield, sharpness, unloading, now.fastest)
 
 
 @inlined
@@ -267,6 +276,8 @@ def load_rates(line: Line, pull: float, now: Conditions, x: State, p: FloatArray
     still = broadcast_as(0.0, wheel)
     pull -= shaft_loss(pull, smooth_sign(wheel, now.width_load), p)
     load = now.load + held_by_angle(load_angle(line, x, p), p)
+    if line.extended:
+        load += load_memory(x.load_speed, x.law_states, around(now), p)
     if not line.extended or every(p[slots.SLIP] <= 0.0):
         return (pull - load_friction(wheel, wheel, now, p) - load) * now.inverse_load, still, still
     vehicle = x.vehicle_speed
@@ -296,27 +307,24 @@ def advanced(line: Line, x: State, dx: State, h: float) -> State:
         twist, load_speed = twist + h * dx.twist, load_speed + h * dx.load_speed
     if line.masses == 3:
         middle_twist, middle_speed = middle_twist + h * dx.middle_twist, middle_speed + h * dx.middle_speed
-    loading, vehicle_speed, traction = x.loading, x.vehicle_speed, x.traction
-    branch_twist, branch_speed, relaxing = x.branch_twist, x.branch_speed, x.relaxing
-    if line.sliding:
-        loading += h * dx.loading
+    vehicle_speed, traction = x.vehicle_speed, x.traction
+    branch_twist, branch_speed, law_states = x.branch_twist, x.branch_speed, x.law_states
     if line.extended:
         vehicle_speed, traction = vehicle_speed + h * dx.vehicle_speed, traction + h * dx.traction
         branch_twist, branch_speed = branch_twist + h * dx.branch_twist, branch_speed + h * dx.branch_speed
-        relaxing += h * dx.relaxing
+        law_states = moved_states(law_states, dx.law_states, h)
     return State(
         x.angle + h * dx.angle,
         x.speed + h * dx.speed,
         twist,
         load_speed,
-        loading,
         vehicle_speed,
         branch_twist,
         branch_speed,
         middle_twist,
         middle_speed,
         traction,
-        relaxing,
+        law_states,
     )
 
 

@@ -57,7 +57,7 @@ def can_share_lanes(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False
-    if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, False, ()), first):
+    if is_linear(Line(len(masses), len(masses) == 1 or is_elastic(first), False, ()), first):
         return False
     return leading_compatible(p, rows) == rows.size
 

@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 from estimator.compiled import inlined
 from estimator.lanes import choose
+from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.kernel.written import several, written
 from estimator.signals.record import FloatArray
 
 ANGLE, SPEED, TWIST, LOAD_SPEED = 0, 1, 2, 3  # mechanical states that can be an output; see ``State``
 LOAD_ANGLE, SHAFT_TORQUE = 20, 21  # outputs that follow from several states
 
-VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 5, 6, 7, 8, 9, 10
+VEHICLE_SPEED, BRANCH_TWIST, BRANCH_SPEED, MIDDLE_TWIST, MIDDLE_SPEED, TRACTION = 4, 5, 6, 7, 8, 9
 """Further ones."""
 
-STATES = 18
+WITH_STATE = tuple(entry for entry in BUILT_IN.values() if entry.acting is not None and entry.acting.rate is not None)
+"""The effects whose law has a state, in the order of the catalogue: so their states stand in ``State.law_states``."""
+
+LAW_STATES = len(WITH_STATE)
+"""How many there are."""
+
+if TYPE_CHECKING:
+    LawStates = tuple[float, ...]
+else:  # compiled, and in C, the number of entries is a part of the type
+    LawStates = tuple[(float,) * LAW_STATES]
+
+FIRST_LAW = 10
+"""Where the laws' states stand in the state array, behind the line's own."""
+
+_LINE, _LAWS = range(FIRST_LAW), range(FIRST_LAW, FIRST_LAW + LAW_STATES)
+
+LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD = range(
+    FIRST_LAW + LAW_STATES, FIRST_LAW + LAW_STATES + 6
+)
+
+STATES = FIRST_LAW + LAW_STATES + 6
 """Length of the state array: ``State``, the lagged torque and its rise [Nm], the filtered reading and its [rad/s], and
 ``Bristles``."""
-
-RELAXING, LAGGED, LAG_RISE, FILTERED, FILTER_RISE, BRISTLES_MOTOR, BRISTLES_LOAD = 11, 12, 13, 14, 15, 16, 17
 
 FOLLOWS = 0.3  # part of its correction with which the other end of a line follows
 
@@ -30,23 +51,32 @@ class State(NamedTuple):
     speed: float  # of the motor [rad/s]
     twist: float  # of the (first) shaft [rad]
     load_speed: float  # of the load, or of the wheels where the tyre slips [rad/s]
-    loading: float  # of the shaft's slider, from -1 to 1
     vehicle_speed: float  # of the vehicle behind a tyre that slips, at the motor shaft [rad/s]
     branch_twist: float  # of the extra mode
     branch_speed: float  # of its inertia [rad/s]
     middle_twist: float  # twist of the second shaft [rad] and speed of the mass before it [rad/s]
     middle_speed: float  # of the mass between the shafts [rad/s]
     traction: float  # of the tyre [Nm]
-    relaxing: float  # torque of the branch in the first shaft that relaxes [Nm]
+    law_states: LawStates  # of the laws ``WITH_STATE``, each in the unit that its law gives it
 
 
-@inlined
-def unpacked(state: FloatArray) -> State:
-    """Return the kernel's state vector as a named tuple."""
-    return State(
-        state[0], state[1], state[2], state[3], state[4], state[5],
-        state[6], state[7], state[8], state[9], state[10], state[11],
-    )  # fmt: skip
+unpacked: Callable[[FloatArray], State] = written(
+    "unpacked",
+    {"state": FloatArray},
+    State,
+    [f"return State({', '.join(f'state[{i}]' for i in _LINE)}, {several(f'state[{i}]' for i in _LAWS)})"],
+    {"__name__": __name__, "State": State},
+)
+"""The kernel's state vector, shape (STATES,), as a named tuple."""
+
+pack: Callable[[State, FloatArray], None] = written(
+    "pack",
+    {"x": State, "state": FloatArray},
+    None,
+    [f"state[{i}] = x[{i}]" for i in _LINE] + [f"state[{i}] = x.law_states[{i - FIRST_LAW}]" for i in _LAWS],
+    {"__name__": __name__},
+)
+"""A named tuple into the kernel's state vector, shape (STATES,)."""
 
 
 @inlined
@@ -61,14 +91,13 @@ def corrected(x: State, error: float, output: int) -> State:
         x.speed + at_motor,
         x.twist,
         x.load_speed + at_load,
-        x.loading,
         x.vehicle_speed + at_load,
         x.branch_twist,
         x.branch_speed + at_motor,
         x.middle_twist,
         x.middle_speed + at_load,
         x.traction,
-        x.relaxing,
+        x.law_states,
     )
 
 
@@ -95,8 +124,8 @@ class Conditions(NamedTuple):
     """What holds during one sub-step: torques [Nm], inertias, stiffness, friction, widths of a sign change [rad/s].
 
     ``rubbing`` is the torque of the bristles at the load, or at the wheels of a tyre that slips [Nm]. And what the step
-    can follow: the fastest decay [1/s] and, as an inverse [1/rad], the shortest twist over which friction inside the
-    shaft yields.
+    can follow: the fastest decay [1/s] and the stiffest spring
+    [Nm/rad].
     """
 
     torque: float  # at the motor [Nm]
@@ -119,5 +148,5 @@ class Conditions(NamedTuple):
     branch_inertia: float  # of the extra mode [kg m^2]; 0 without
     branch_frequency: float  # its own [rad/s]
     fastest: float  # decay that the step has to follow [1/s]
-    inverse_yield: float  # of the twist over which friction in the shaft yields [1/rad]
+    stiffest: float  # spring that it can follow at the lightest inertia [Nm/rad]
     tyre: Tyre  # its numbers

@@ -94,10 +94,10 @@ def test_sums_are_the_sub_steps_of_a_mode_within_the_line(values: str, place: st
 
 
 def test_what_is_nonlinear_slips_or_drags_is_not_linear() -> None:
-    elastic = Line(2, True, False, False, ())
+    elastic = Line(2, True, False, ())
     p = flat(model(TWO_MASS))
     assert linear.is_linear(elastic, p)
-    assert not linear.is_linear(Line(2, False, False, False, ()), p)
+    assert not linear.is_linear(Line(2, False, False, ()), p)
     for effect, parameter in (
         ("quadratic_friction", "quadratic_nm_s2"),
         ("aerodynamic_drag", "drag_nm_s2"),

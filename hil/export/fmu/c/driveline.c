@@ -19,7 +19,7 @@ static State state(const Driveline *d) {
 
 static Line line(Driveline *d) {
     int elastic = MASSES == 1 || conditions_is_elastic(parameters(d));
-    return (Line){MASSES, elastic, !elastic, conditions_is_extended(parameters(d))};
+    return (Line){MASSES, elastic, conditions_is_extended(parameters(d))};
 }
 
 /* ---- a torque's past, which a delay reads ---- */
@@ -238,5 +238,5 @@ void driveline_update(Driveline *d) {
     v[SPEED_MOTOR] = x.speed;
     v[ANGLE_MOTOR] = x.angle;
     v[SPEED_LOAD] = MASSES == 1 ? x.speed : x.load_speed;
-    v[TORQUE_SHAFT] = MASSES == 1 ? 0.0 : rates_shaft_torques(made, moving.twist, felt, x, p).item0 + x.relaxing;
+    v[TORQUE_SHAFT] = MASSES == 1 ? 0.0 : rates_shaft_torques(made, moving.twist, felt, x, p).item0;
 }
