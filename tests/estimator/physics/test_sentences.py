@@ -51,7 +51,7 @@ SENTENCES: dict[str, tuple[dict[str, float], list[str]]] = {
     "gear_losses": ({"driving_share": 0.0456, "back_share": 0.0789}, ["4.56% driving", "7.89%"]),
     "torque_nonlinearity": (
         {"curvature_per_nm": 4e-4, "asymmetry_per_nm": 1e-4},
-        ["5.00% at 100 Nm", "3.00% at -100 Nm"],
+        ["1 % for each 20 Nm where it is positive", "33.3 Nm where it is negative"],
     ),
     "torque_bias": ({"offset_nm": -4.56, "time_constant_s": 7.89}, ["4.56 Nm below its reading", "7.89 s"]),
     "grounded_spring": ({"stiffness_nm_per_rad": 45.6}, ["45.6 Nm/rad"]),

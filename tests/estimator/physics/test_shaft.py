@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from estimator.physics.effects.shaft import stiffness_factor
-from estimator.physics.kernel import rates, slots
+from estimator.physics.kernel import conditions, rates
+from estimator.physics.kernel.state_vector import STATES, unpacked
 from estimator.physics.laws import inertia_while, share_inside, smooth_sign
 from estimator.physics.layout import flat_values
 from estimator.signals.record import FloatArray
 from tests.estimator.physics.bench import TWO_MASS
 
 
-def shaft_torque(twist: float, rate: float, p: FloatArray, loading: float = 0.0) -> float:
-    return rates.shaft_torque(twist, rate, loading, p, p[slots.K])
+def shaft_torque(twist: float, rate: float, p: FloatArray) -> float:
+    now = conditions.conditions(2, 0.0, 1e-3, 0.0, 0.0, 0.01, p)
+    line = conditions.Line(masses=2, elastic=False, extended=False, own=())
+    return rates.shaft_torque(line, twist, rate, now, unpacked(np.zeros(STATES)), p)
 
 
 def torques(twists: FloatArray, hardening: float, shape: float) -> FloatArray:
