@@ -7,7 +7,8 @@ import numpy as np
 
 from estimator.physics.effects.shaft import loading_rate
 from estimator.physics.inputs import shaft_torque
-from estimator.physics.kernel import conditions, rates, sensing, slots
+from estimator.physics.kernel import conditions, rates, sensing
+from estimator.physics.kernel.state_vector import STATES, unpacked
 from estimator.physics.layout import flat_values
 from estimator.signals.record import FloatArray
 from tests.docs.bus import BUS, TIME_S, Values
@@ -62,7 +63,9 @@ def shaft(name: str) -> Callable[[Values], Curve]:
         lines = []
         for label, effects in (("without", {}), ("with", {name: values})):
             p = flat_values(BUS, effects)
-            torque = np.array([rates.shaft_torque(twist, 0.0, 0.0, p, p[slots.K]) for twist in TWISTS])
+            now = conditions.conditions(2, 0.0, 1e-3, 0.0, 0.0, 0.05, p)
+            line, still = conditions.Line(2, elastic=False, extended=False, own=()), unpacked(np.zeros(STATES))
+            torque = np.array([rates.shaft_torque(line, twist, 0.0, now, still, p) for twist in TWISTS])
             lines.append((label, 1e3 * TWISTS, torque))
         return Curve("twist [mrad]", "shaft torque [Nm]", tuple(lines))
 
