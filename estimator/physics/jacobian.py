@@ -101,7 +101,9 @@ def secants_at(problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], w
     ``widths`` is of shape (U,), above 0. A bound cuts a side off: beyond it there is nothing to be said.
     """
     low, high = bounds(problem)
-    up, down = np.minimum(widths, high - x), np.minimum(widths, x - low)
+    free = low < high  # what is held may be at infinity, as the limit of an inverter that has none
+    low, high, at = (np.where(free, each, 0.0) for each in (low, high, x))
+    up, down = np.minimum(widths, high - at), np.minimum(widths, at - low)
     both = np.maximum(up + down, STEP)
     found = np.zeros((sum(int(use.sum()) for use in problem.use), x.size))
     for side, steps in ((up, up), (down, -down)):

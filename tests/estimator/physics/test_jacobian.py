@@ -11,7 +11,7 @@ from estimator.physics.jacobian import fill_differences, jacobian_at, secants_at
 from estimator.physics.layout import Grid
 from estimator.physics.model import DrivelineModel
 from estimator.physics.problem import Problem, make_problem, outputs_at, own_part, start_vector
-from estimator.physics.unknowns import Shared, nominal_unknowns, own_unknowns
+from estimator.physics.unknowns import Shared, effect_unknowns, nominal_unknowns, own_unknowns
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
@@ -186,3 +186,18 @@ def test_a_bound_cuts_a_side_off() -> None:
     (down,) = outputs_at(problem, x - 2e-3 * np.eye(x.size)[0])
     expected = (outputs[0] - down)[problem.use[0]] / 2e-3
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_what_is_held_at_infinity_has_no_slope() -> None:
+    """A limit of both inverters' sum leaves theirs where there is none."""
+    line, records = model(TWO_MASS), recordings(300)
+    releases = effect_unknowns("torque_saturation", line, records)
+    problem = next(p for p in (make_problem(line, records, each.shared) for each in releases) if not finite(p).all())
+    x = start_vector(problem)
+    found = secants_at(problem, x, outputs_at(problem, x), np.full(x.size, 2e-3))
+    np.testing.assert_array_equal(found[:, ~finite(problem)], 0.0)
+    assert found[:, finite(problem)].any()
+
+
+def finite(problem: Problem) -> np.ndarray:
+    return np.isfinite(start_vector(problem))
