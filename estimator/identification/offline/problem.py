@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,9 @@ MOST_DERIVATIVES = 45
 
 MOST_STARTS = 3
 """Starts that are followed, those of least cost first: the next best is there for what the best misses."""
+
+WHOLE, BEGINNING = 30_000, 6_000
+"""Blocks of a recording up to which starts are followed over the whole; of a longer one first over its beginning."""
 
 SETTLED = 1e-7
 """Relative change of the sum of squares that ends a fit: of 10 000 samples, a thousandth of one parameter's share."""
@@ -252,13 +255,25 @@ class Problem:
         return x
 
     def solve(self, starts: Iterable[LinearModel | FloatArray]) -> FloatArray:
-        """Return the x of least cost over the best starts, each a model or an x."""
+        """Return the x of least cost over the best starts, each a model or an x.
+
+        Of a long recording each is followed over its beginning first: from there it is near.
+        """
         with threadpool_limits(1):  # problems this small wait for other threads longer than they compute
             begin = [self.start(start) if isinstance(start, LinearModel) else start for start in starts]
             begin = sorted(begin, key=self._cost)[:MOST_STARTS]
+            if self.blocks.okay.size > WHOLE:
+                beginning = self._beginning()
+                begin = [min(x, beginning.solve([x]), key=self._cost) for x in begin]
             if self.noise_order:
                 begin = [min((self._with_noise_projected(x) for x in begin), key=self._cost)]
             return min((descended(self.residual, self.jacobian, x) for x in begin), key=self._cost)
+
+    def _beginning(self) -> Problem:
+        """Return the problem of the first samples alone, with the same unknowns."""
+        first = slice(BEGINNING * self.block)
+        read = None if self.read is None else self.read[first]
+        return replace(self, u=self.u[first], y=self.y[first], okay=self.okay[first], read=read)
 
     def _cost(self, x: FloatArray) -> float:
         w = self.residual(x)

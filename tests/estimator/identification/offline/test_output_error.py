@@ -3,7 +3,8 @@ import pytest
 
 from estimator.errors import NotExciting
 from estimator.identification.linear_model import LinearModel, Orders
-from estimator.identification.offline.fits import LinearFit, fit_output_error
+from estimator.identification.offline import problem
+from estimator.identification.offline.fits import LinearFit, fit_box_jenkins, fit_output_error
 from estimator.signals.prbs import prbs_nm
 from estimator.signals.record import BoolArray, FloatArray, Record
 
@@ -60,6 +61,20 @@ def test_forty_percent_masked_samples_do_not_bias_it() -> None:
     assert np.abs(deviation).max() < 3.5
     assert fit.n_samples == np.count_nonzero(okay)
     assert fit.rms == pytest.approx(0.3, rel=0.06)
+
+
+@pytest.mark.parametrize("silent", [0, 300])
+def test_over_its_beginning_first_a_long_recording_gives_the_same(silent: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a beginning without an output, or one too short to tell, it is as if there had been none."""
+    okay = np.ones(N, dtype=bool)
+    okay[1:silent] = False
+    whole = [fit(record(noisy(4), okay), TRUTH.orders) for fit in (fit_output_error, fit_box_jenkins)]
+    monkeypatch.setattr(problem, "WHOLE", 400)
+    monkeypatch.setattr(problem, "BEGINNING", 250)
+    for before, fit in zip(whole, (fit_output_error, fit_box_jenkins), strict=True):
+        found = fit(record(noisy(4), okay), TRUTH.orders)
+        deviation = (found.model.theta - before.model.theta) / np.sqrt(np.diag(before.covariance))
+        assert np.abs(deviation).max() < 1e-2
 
 
 def test_masked_outputs_may_be_no_numbers_and_nothing_is_changed() -> None:
