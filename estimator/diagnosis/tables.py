@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
+from estimator.diagnosis.inference.hypotheses import Effects as Names, Hypothesis
+from estimator.diagnosis.inference.trials import between_blocks
 from estimator.diagnosis.result import UnnamedTable
 from estimator.diagnosis.table_curves import SLIDER, YIELDING, Curve, Masks, curve_at, shapes, signal_over, values_at
 from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over, with_curve
@@ -59,6 +60,10 @@ SMOOTHNESS = (1.0, 0.05)
 as so many thousandths of the squared error before."""
 
 
+Effects = Mapping[str, Mapping[str, EffectValue]]
+"""Values of effects, by name and parameter."""
+
+
 @dataclass(frozen=True)
 class TableFit:
     """A law without a name, fitted."""
@@ -66,9 +71,8 @@ class TableFit:
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
     law: UnnamedTable  # as it is reported
-    effects: Mapping[
-        str, Mapping[str, EffectValue]
-    ]  # that the model gets: the table, and the slider of one that yields
+    effects: Effects  # that the model gets: the table, and the slider of one that yields
+    between: tuple[FitResult, Effects] | None  # both, fitted to what is between the blocks that judge a diagnosis
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -168,17 +172,15 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
     rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
-    table, at = widened_by_jackknife(table, torques), PLACES[table.place]
+    table, place, at = widened_by_jackknife(table, torques), table.place, PLACES[table.place]
     slope = drawn.descent.curve.own * drawn.descent.curve.slope_of(result.p)
-    effects, alike, formula = {table.name: table.effect()}, looks_like(table, slope), shortest_formula(table, slope)
-    where = signal_over(table.place, result, 0.0)
+    alike, formula, where = looks_like(table, slope), shortest_formula(table, slope), signal_over(place, result, 0.0)
     if drawn.descent.curve.yields:
-        names, of = ("friction_nm", "yield_rad", "sharpness"), unit("torque", line.motion)
-        effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
+        of = unit("torque", line.motion)
         alike = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
         formula = ""
     law = UnnamedTable(
-        place=table.place,
+        place=place,
         element=at.element,
         over=at.over,
         unit=unit(at.dimension, line.motion),
@@ -195,7 +197,27 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         rival=next(iter(rivals), ""),
         not_carried=tuple(not_carried),
     )
-    return TableFit(table, result, law, effects)
+    between = None if holdout else _between(drawn, whole)
+    return TableFit(table, result, law, _effects(drawn.descent, result, table), between)
+
+
+def _effects(descent: Descent, result: FitResult, table: Table) -> Effects:
+    """Return what a model with the law gets."""
+    effects: dict[str, Mapping[str, EffectValue]] = {table.name: table.effect()}
+    if descent.curve.yields:
+        names = ("friction_nm", "yield_rad", "sharpness")
+        effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
+    return effects
+
+
+def _between(best: Candidate, whole: FitResult) -> tuple[FitResult, Effects]:
+    """Return a law that has not seen the blocks by which a diagnosis is judged."""
+    use = tuple(
+        used & seen for used, seen in zip(whole.problem.use, between_blocks(whole.problem.records), strict=True)
+    )
+    descent, z = _refitted(best, fit(replace(whole.problem, use=use), whole.x, STEPS), use)
+    result, table = reported(descent, z)
+    return result, _effects(descent, result, table)
 
 
 def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:
@@ -221,7 +243,7 @@ Squares = tuple[float, float]
 
 
 def _left_out(
-    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects, knots: Sequence[float]
+    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Names, knots: Sequence[float]
 ) -> tuple[list[Squares], list[FloatArray]]:
     """Return, for each recording, the errors on it of a fit to the others, and that fit's torque at some knots.
 
@@ -252,7 +274,7 @@ def widened_by_jackknife(table: Table, torques: Sequence[FloatArray]) -> Table:
 
 
 def _squares_on(
-    records: Sequence[Record], line: DrivelineModel, effects: Effects, without: FitResult, with_law: FitResult
+    records: Sequence[Record], line: DrivelineModel, effects: Names, without: FitResult, with_law: FitResult
 ) -> list[Squares]:
     """Return the errors of two fits on recordings that they have not seen."""
 
