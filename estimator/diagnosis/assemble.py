@@ -368,7 +368,8 @@ def augmented_model(
     """Return the model with re-tuned parameters and the effects found in addition to those it had."""
     parameters = {**model.parameters, **_retuned_line(result, cov, model)}
     added: dict[str, Mapping[str, EffectValue]] = {
-        effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
+        effect.name: {name: EffectValue(p.value, p.ci95).at(p.value) for name, p in effect.parameters.items()}
+        for effect in effects  # the interval holds it: a fit may end beyond a bound by its last digit
     }
     return replace(model, parameters=parameters, effects={**_retuned_effects(result, model), **added})
 
