@@ -43,7 +43,10 @@ def covariance(result: FitResult) -> FloatArray:
     parameter at a bound of its law is held there and has no variance. A nominal parameter at the edge of its tolerance
     is not: the tolerance is a belief about it, and how well the data determine it does not change there.
     """
-    free = free_unknowns(result)
+    return _sandwich(result, free_unknowns(result))
+
+
+def _sandwich(result: FitResult, free: BoolArray) -> FloatArray:
     j = result.jacobian[:, free]
     bread = _bread(j)
     full = np.zeros((result.x.size, result.x.size))
@@ -56,11 +59,19 @@ def reported_covariance(result: FitResult) -> FloatArray:
 
     The part of the error that its own past predicts is physics written another way, or the torque reading's own
     noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
-    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``.
+    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``. A parameter that ended at a bound of
+    its law has the variance that it would have without the bound, by itself: its interval goes one way, from the bound.
     """
-    free = free_unknowns(result)
-    full = covariance(result)
-    full[np.ix_(free, free)] += coherent_variance(result) * _bread(result.jacobian[:, free])
+    free, coherent = free_unknowns(result), coherent_variance(result)
+
+    def reported(free: BoolArray) -> FloatArray:
+        full = _sandwich(result, free)
+        full[np.ix_(free, free)] += coherent * _bread(result.jacobian[:, free])
+        return full
+
+    full, each = reported(free), np.arange(result.x.size)
+    for i in (i for i, shared in enumerate(result.problem.shared) if not free[i] and shared.low < shared.high):
+        full[i, i] = reported(free | (each == i))[i, i]
     return full
 
 
@@ -357,7 +368,8 @@ def augmented_model(
     """Return the model with re-tuned parameters and the effects found in addition to those it had."""
     parameters = {**model.parameters, **_retuned_line(result, cov, model)}
     added: dict[str, Mapping[str, EffectValue]] = {
-        effect.name: {name: EffectValue(p.value, p.ci95) for name, p in effect.parameters.items()} for effect in effects
+        effect.name: {name: EffectValue(p.value, p.ci95).at(p.value) for name, p in effect.parameters.items()}
+        for effect in effects  # the interval holds it: a fit may end beyond a bound by its last digit
     }
     return replace(model, parameters=parameters, effects={**_retuned_effects(result, model), **added})
 

@@ -23,6 +23,8 @@ _AT: dict[str, Element] = {
 }
 """Where a nominal parameter is; the others are a shaft's, or of what is between two."""
 
+SURE = 0.95  # share of names that were right from which on one is sure, as an interval is
+
 
 class Verdict(Enum):
     """The honest answers."""
@@ -52,9 +54,10 @@ class Doubt:
 class Region:
     """Operating region where the mismatch lives: the range of one signal."""
 
-    signal: str  # name with its unit: torque, motor speed, shaft torque, load speed
+    signal: str  # torque, motor speed, shaft torque, load speed
     low: float  # of the central 80 % of the error's power
     high: float  # its upper end
+    unit: str = ""  # of the signal, SI
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +123,16 @@ class Counted:
     def probability(self) -> float:
         """What the count shows of the next such name: Laplace's rule of succession, never above the share itself."""
         return min((self.right + 1.0) / (self.of + 2.0), self.right / self.of)
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether such a name is said without a "probably": as often right as the intervals next to it."""
+        return self.right >= SURE * self.of
+
+    @property
+    def words(self) -> str:
+        """The count as a reader needs it, for example ``18 of 22 such names were right: 82 %``."""
+        return f"{self.right} of {self.of} such names were right: {100.0 * self.right / self.of:.0f} %"
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +219,11 @@ class Effort:
     candidates: int = 0  # effects that these recordings can show
     limit_s: float = math.inf  # of time, inf without one [s]
     sets: tuple[FittedSet, ...] = ()  # the smaller first, then the more probable
+
+    @property
+    def fitted(self) -> str:
+        """Which effects a search without a find speaks of: the end of "no effect"."""
+        return "of the catalogue that was fitted" if self.untried else "of the catalogue"
 
 
 @dataclass(frozen=True, slots=True)

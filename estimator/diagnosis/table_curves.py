@@ -7,12 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
+from estimator.physics.curve import curve_over
 from estimator.physics.fit import FitResult
-from estimator.physics.layout import OBSERVER, slot
+from estimator.physics.layout import OBSERVER, flat_values, slot
 from estimator.physics.motion import torque_scale
 from estimator.physics.problem import Problem, case_of
 from estimator.physics.table_signals import signal_of
-from estimator.physics.tables import COUNT, DAMPING, PREFIX
+from estimator.physics.tables import COUNT, DAMPING, PREFIX, Table
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import BoolArray, FloatArray
 
@@ -27,7 +28,7 @@ STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_s
 YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 """A torque over the twist that yields, as a clutch slips: a straight curve and the slider of this effect."""
 
-LEVEL, SUDDEN, REACH_OF_SLIP = 0.7, 10.0, 100.0  # its start in the torque in use, knee, reach in the twist without it
+LEVEL, SUDDEN = 0.7, 10.0  # where its level starts, in the torque in use, and its knee
 
 Masks = tuple[BoolArray, ...]
 """Which samples count, per recording."""
@@ -43,7 +44,6 @@ class Curve:
     own: float  # slope that the line has without it, in ``base``
     most: tuple[float, float]  # bounds of the slopes, its own among them
     more: tuple[Shared, ...]  # unknowns next to the slopes: a damping of its own, a level at which it yields
-    reached: tuple[float, float]  # values of the signal that the recordings contain
 
     @property
     def name(self) -> str:
@@ -76,6 +76,23 @@ class Curve:
         sums = np.vstack([np.zeros(self.pieces), np.tril(np.ones((self.pieces, self.pieces))) * steps])
         return np.delete(sums - sums[self.zero], self.zero, axis=0)
 
+    def drawn_in(self, signal: FloatArray) -> Curve:
+        """Return the curve with knots where a simulation with it was, ``signal`` (N,), and none beyond.
+
+        They are laid before the fit, by a simulation without the curve: with it, a shaft that slips turns on.
+        """
+        inside = self.knots[(self.knots > signal.min()) & (self.knots < signal.max())]
+        anchor = self.knots[self.zero]
+        sides = [np.append(-inside[::-1], -signal.min()), np.append(inside, signal.max())]
+        down, up = (_outward(sign * anchor, side, sign * signal) for sign, side in zip((-1.0, 1.0), sides, strict=True))
+        return replace(self, knots=np.array([*(-each for each in reversed(down)), anchor, *up]))
+
+    def slopes_between(self, knots: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return the slopes, shape (K - 1,), of this curve of these ``slopes`` between K other knots."""
+        values = np.insert(self.values_of_slopes @ (slopes - self.own), self.zero, 0.0)
+        there = values_at(Table(self.place, tuple(self.knots.tolist()), tuple(values.tolist())), knots)
+        return np.diff(there) / (self.base * np.diff(knots)) + self.own
+
     def released(self, result: FitResult, use: Masks) -> Problem:
         """Return the problem of a fit with the curve's values next to its own unknowns."""
         problem = result.problem
@@ -100,8 +117,7 @@ def curve_at(place: str, result: FitResult, gain: float) -> Curve | None:
     torque = torque_scale([problem.records[drive[0]] for drive in problem.drives])
     yields = place == YIELDING
     place = "shaft_twist" if yields else place
-    signal = np.concatenate(_signals(place, result, gain))
-    signal = signal[np.isfinite(signal)]
+    signal = signal_over(place, result, gain)
     low, high = (float(each) for each in np.quantile(signal, [0.005, 0.995]))
     knots = _knots(signal, low, high)
     if knots is None:
@@ -109,15 +125,15 @@ def curve_at(place: str, result: FitResult, gain: float) -> Curve | None:
     top = max(abs(low), abs(high))
     damping = Shared(PREFIX + place, DAMPING, c or 0.02 * np.sqrt(k), 0.0, 5.0, 0.1)
     if yields:
-        knots = REACH_OF_SLIP * top * np.array([-1.0, 0.0, 1.0])
+        knots = np.array([0.0, top])  # straight on at both ends
         level = Shared(SLIDER, "friction_nm", torque, 0.0, 4.0, LEVEL)
         twist = Shared(SLIDER, "yield_rad", torque / k, 0.02, 4.0, LEVEL)
-        return Curve(place, knots, k, 1.0, (0.0, 1.0), (damping, level, twist), (low, high))
+        return Curve(place, knots, k, 1.0, (0.0, 1.0), (damping, level, twist))
     if place == "shaft_twist":
-        return Curve(place, knots, k, 1.0, (0.0, 8.0), (damping,), (low, high))
+        return Curve(place, knots, k, 1.0, (0.0, 8.0), (damping,))
     if place == "torque":
-        return Curve(place, knots, 1.0, 1.0, (0.0, 3.0), (), (low, high))
-    return Curve(place, knots, torque / top, 0.0, (-10.0, 10.0), (), (low, high))
+        return Curve(place, knots, 1.0, 1.0, (0.0, 3.0), ())
+    return Curve(place, knots, torque / top, 0.0, (-10.0, 10.0), ())
 
 
 def _knots(signal: FloatArray, low: float, high: float) -> FloatArray | None:
@@ -138,15 +154,33 @@ def _knots(signal: FloatArray, low: float, high: float) -> FloatArray | None:
     return found if found.size > 2 else None
 
 
-def _signals(place: str, result: FitResult, gain: float) -> list[FloatArray]:
-    """Return what a curve is over in every recording, of a simulation that follows the readings a little."""
+def _outward(anchor: float, knots: FloatArray, signal: FloatArray) -> list[float]:
+    """Return rising knots above an anchor, samples enough between each two; the last one stays before all others."""
+    kept = [anchor]
+    for knot in knots[knots > anchor]:
+        if np.count_nonzero((signal >= kept[-1]) & (signal < knot)) >= FEWEST_SAMPLES:
+            kept.append(float(knot))
+        elif knot == knots[-1] and len(kept) > 1:
+            kept[-1] = float(knot)
+    return kept[1:]
+
+
+def signal_over(place: str, result: FitResult, gain: float) -> FloatArray:
+    """Return what a curve is over in all recordings, (N,): of an observer of the readings, of a free run at gain 0."""
     problem, found = result.problem, []
     for first, *_ in problem.drives:
         case = case_of(problem.local[first], result.p, result.local_of(first))
         p = case.p.copy()
         p[slot("", OBSERVER)] = gain
         found.append(signal_of(place, problem.grid, problem.records[first], replace(case, p=p)))
-    return found
+    signal = np.concatenate(found)
+    return signal[np.isfinite(signal)]
+
+
+def values_at(table: Table, x: FloatArray) -> FloatArray:
+    """Return a curve's torque at each ``x``, shape (N,) [Nm]; beyond its knots it goes straight on."""
+    p = flat_values({}, {table.name: {key: each.value for key, each in table.effect().items()}})
+    return curve_over(x, p, slot(table.name, COUNT))
 
 
 def shapes(curve: Curve) -> dict[str, FloatArray]:

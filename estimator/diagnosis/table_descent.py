@@ -92,22 +92,26 @@ def rms_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> f
     return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
-def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
-    """Return the fit with the curve among what is given, and the curve with its intervals."""
-    problem, x, curve = descent.at(0.0), descent.x(z), descent.curve
+def with_curve(descent: Descent, z: FloatArray) -> FitResult:
+    """Return the fit with the curve among what is given: a free run."""
+    problem, x = descent.at(0.0), descent.x(z)
     outputs = outputs_at(problem, x)
-    residual = residual_at(problem, outputs)
-    values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
-    half = np.insert(_half_widths(descent, problem, x, outputs, residual), curve.zero, 0.0)
-    bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
-    added = range(descent.first, descent.after + len(curve.more))
+    added = range(descent.first, descent.after + len(descent.curve.more))
     p = problem.p.copy()
     for i in added:
         p[problem.shared[i].slot] = problem.shared[i].scale * x[i]
-    damping = float(p[slot(curve.name, DAMPING)]) if curve.more else 0.0
-    table = Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
     given = replace(problem, p=p, shared=problem.shared[: descent.first])
-    return FitResult(given, np.delete(x, added), outputs, residual, None, False), table
+    return FitResult(given, np.delete(x, added), outputs, residual_at(problem, outputs), None, False)
+
+
+def reported(descent: Descent, z: FloatArray) -> tuple[FitResult, Table]:
+    """Return the fit with the curve among what is given, and the curve with its intervals."""
+    problem, x, curve, fit = descent.at(0.0), descent.x(z), descent.curve, with_curve(descent, z)
+    values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
+    half = np.insert(_half_widths(descent, problem, x, fit.outputs, fit.residual), curve.zero, 0.0)
+    bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
+    damping = float(fit.problem.p[slot(curve.name, DAMPING)]) if curve.more else 0.0
+    return fit, Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
 
 
 def _half_widths(

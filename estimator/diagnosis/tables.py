@@ -16,10 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
+from estimator.diagnosis.inference.hypotheses import Effects as Names, Hypothesis
+from estimator.diagnosis.inference.trials import between_blocks
 from estimator.diagnosis.result import UnnamedTable
-from estimator.diagnosis.table_curves import SLIDER, YIELDING, Curve, Masks, curve_at, shapes
-from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over
+from estimator.diagnosis.table_curves import SLIDER, YIELDING, Curve, Masks, curve_at, shapes, signal_over, values_at
+from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over, with_curve
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import ITERATIONS, FitResult, fit
@@ -59,6 +60,10 @@ SMOOTHNESS = (1.0, 0.05)
 as so many thousandths of the squared error before."""
 
 
+Effects = Mapping[str, Mapping[str, EffectValue]]
+"""Values of effects, by name and parameter."""
+
+
 @dataclass(frozen=True)
 class TableFit:
     """A law without a name, fitted."""
@@ -66,9 +71,8 @@ class TableFit:
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
     law: UnnamedTable  # as it is reported
-    effects: Mapping[
-        str, Mapping[str, EffectValue]
-    ]  # that the model gets: the table, and the slider of one that yields
+    effects: Effects  # that the model gets: the table, and the slider of one that yields
+    between: tuple[FitResult, Effects] | None  # both, fitted to what is between the blocks that judge a diagnosis
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -158,8 +162,9 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     if after > BETTER * before:
         return None
     last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
-    result, table = reported(last, z)
-    kept, torques = ([], []) if len(records) == 1 else _left_out(best, whole, line, hypothesis.effects)
+    drawn = _drawn_in(replace(best, descent=last, z=z), whole, use)
+    result, table = reported(drawn.descent, drawn.z)
+    kept, torques = ([], []) if len(records) == 1 else _left_out(best, whole, line, hypothesis.effects, table.knots)
     foreign = _squares_on(holdout, line, hypothesis.effects, whole, result)
     if any(sum(after for _, after in each) > sum(before for before, _ in each) for each in (kept, foreign)):
         return None
@@ -167,16 +172,15 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
     rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
-    table, at = widened_by_jackknife(table, torques), PLACES[table.place]
-    slope = last.curve.own * last.curve.slope_of(result.p)
-    effects, alike, formula = {table.name: table.effect()}, looks_like(table, slope), shortest_formula(table, slope)
-    if last.curve.yields:
-        names, of = ("friction_nm", "yield_rad", "sharpness"), unit("torque", line.motion)
-        effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
+    table, place, at = widened_by_jackknife(table, torques), table.place, PLACES[table.place]
+    slope = drawn.descent.curve.own * drawn.descent.curve.slope_of(result.p)
+    alike, formula, where = looks_like(table, slope), shortest_formula(table, slope), signal_over(place, result, 0.0)
+    if drawn.descent.curve.yields:
+        of = unit("torque", line.motion)
         alike = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
         formula = ""
     law = UnnamedTable(
-        place=table.place,
+        place=place,
         element=at.element,
         over=at.over,
         unit=unit(at.dimension, line.motion),
@@ -185,7 +189,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         values=table.values,
         ci95=table.ci95 or (),
         slope=slope,
-        reached=last.curve.reached,
+        reached=(float(where.min()), float(where.max())),
         rms_before=before,
         rms_after=after,
         looks_like=alike,
@@ -193,7 +197,27 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         rival=next(iter(rivals), ""),
         not_carried=tuple(not_carried),
     )
-    return TableFit(table, result, law, effects)
+    between = None if holdout else _between(drawn, whole)
+    return TableFit(table, result, law, _effects(drawn.descent, result, table), between)
+
+
+def _effects(descent: Descent, result: FitResult, table: Table) -> Effects:
+    """Return what a model with the law gets."""
+    effects: dict[str, Mapping[str, EffectValue]] = {table.name: table.effect()}
+    if descent.curve.yields:
+        names = ("friction_nm", "yield_rad", "sharpness")
+        effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
+    return effects
+
+
+def _between(best: Candidate, whole: FitResult) -> tuple[FitResult, Effects]:
+    """Return a law that has not seen the blocks by which a diagnosis is judged."""
+    use = tuple(
+        used & seen for used, seen in zip(whole.problem.use, between_blocks(whole.problem.records), strict=True)
+    )
+    descent, z = _refitted(best, fit(replace(whole.problem, use=use), whole.x, STEPS), use)
+    result, table = reported(descent, z)
+    return result, _effects(descent, result, table)
 
 
 def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:
@@ -203,14 +227,25 @@ def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, 
     return descent, z
 
 
+def _drawn_in(best: Candidate, result: FitResult, use: Masks) -> Candidate:
+    """Draw a curve's knots in to where the simulation with it was, and fit it once more where that changes it."""
+    old, slopes = best.descent, slice(best.descent.first, best.descent.after)
+    curve = old.curve.drawn_in(signal_over(old.curve.place, with_curve(old, best.z), 0.0))
+    between = old.curve.slopes_between(curve.knots, best.z[slopes])
+    descent, z = Descent(curve, result, use), np.concatenate([best.z[: slopes.start], between, best.z[slopes.stop :]])
+    if not curve.yields:  # a straight one is the same through any knots
+        z, _ = descent.fitted(z, 0.0, best.smooth, LAST_STEPS)
+    return replace(best, descent=descent, z=z)
+
+
 Squares = tuple[float, float]
 """Squared error of the free run on a recording that a fit has not seen, without the law and with it."""
 
 
 def _left_out(
-    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects
+    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Names, knots: Sequence[float]
 ) -> tuple[list[Squares], list[FloatArray]]:
-    """Return, for each recording, the errors on it of a fit to the others, and that fit's torque at the knots.
+    """Return, for each recording, the errors on it of a fit to the others, and that fit's torque at some knots.
 
     They say what a law is worth on a drive of another kind, and how far its curve depends on one drive.
     """
@@ -220,7 +255,7 @@ def _left_out(
         known = fit(replace(problem, use=seen), whole.x, STEPS)
         with_law, table = reported(*_refitted(best, known, seen))
         found += _squares_on([record], line, effects, known, with_law)
-        torques.append(np.array(table.values) + best.descent.curve.slope_of(with_law.p) * np.array(table.knots))
+        torques.append(values_at(table, at := np.array(knots)) + best.descent.curve.slope_of(with_law.p) * at)
     return found, torques
 
 
@@ -239,7 +274,7 @@ def widened_by_jackknife(table: Table, torques: Sequence[FloatArray]) -> Table:
 
 
 def _squares_on(
-    records: Sequence[Record], line: DrivelineModel, effects: Effects, without: FitResult, with_law: FitResult
+    records: Sequence[Record], line: DrivelineModel, effects: Names, without: FitResult, with_law: FitResult
 ) -> list[Squares]:
     """Return the errors of two fits on recordings that they have not seen."""
 

@@ -43,9 +43,9 @@ class _EffectEntry(_Entry):
     tolerance: float = 0.0
 
     @model_validator(mode="after")
-    def _interval_is_ordered(self) -> Self:
-        if self.ci95 and self.ci95[0] > self.ci95[1]:
-            refuse([Fault("ci95", "the lower bound first", self.ci95)])
+    def _interval_holds_the_value(self) -> Self:
+        if self.ci95 and not self.ci95[0] <= self.value <= self.ci95[1]:
+            refuse([Fault("ci95", f"the lower bound first, and the value, {self.value:g}, between both", self.ci95)])
         return self
 
 
@@ -85,6 +85,14 @@ class TableEntry(_Strict):
     values: list[float]  # one for each knot [Nm; translation N]
     ci95: list[Bounds] | None = None  # [low, high] of each value
     damping: float = 0.0  # of its own over the rate, with `shaft_twist` alone [Nm s/rad]
+
+    @model_validator(mode="after")
+    def _intervals_hold_their_values(self) -> Self:
+        pairs = zip(self.ci95 or (), self.values, strict=False)  # that they are as many is seen by `table_faults`
+        for i, (band, value) in enumerate(pairs):
+            if band[0] <= band[1] and not band[0] <= value <= band[1]:
+                refuse([Fault(f"ci95.{i}", f"the value there, {value:g}, between both bounds", band)])
+        return self
 
     def law(self, place: str) -> LawAsTable:
         """Return it as the law at a place."""

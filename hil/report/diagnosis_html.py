@@ -55,6 +55,7 @@ from hil.report.wording import (
     location_rows,
     quantity,
     torque_axis,
+    unseen_data,
 )
 
 MOST_DRAWN = 20
@@ -93,7 +94,7 @@ def diagnosis_page(diagnosis: Diagnosis, made: Provenance | None = None, one_in:
                 headline(diagnosis), *_statement(diagnosis, one_in), _tiles(diagnosis), kind=_kind(diagnosis),
                 badge=badge(diagnosis), facts=facts(made),
             ),
-            html.section("Fit", _fit(diagnosis.fit), _further_outputs(diagnosis.fit)),
+            html.section("Fit", *_fit_of(diagnosis)),
             _acquired(diagnosis),
             None if diagnosis.table is None else table_figure.section(diagnosis.table, diagnosis.fit.unit),
             _found(diagnosis),
@@ -126,8 +127,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> RenderableType:
                 *doubts(diagnosis), html.paragraph(diagnosis.statement),
                 kind=_kind(diagnosis), badge=badge(diagnosis),
             ),
-            _fit(diagnosis.fit),
-            _further_outputs(diagnosis.fit),
+            *_fit_of(diagnosis),
             _effects(diagnosis.effects, is_main),
             *found,
             _parameters(diagnosis),
@@ -176,6 +176,14 @@ def _tiles(diagnosis: Diagnosis) -> html.Tiles:
             ("recordings", str(len(training)), f"and {held_out} held out" if held_out else KEPT_BACK),
         ]
     )
+
+
+def _fit_of(diagnosis: Diagnosis) -> Iterator[Any]:
+    """Yield the errors in figures, of which data they are, and those of further outputs."""
+    yield _fit(diagnosis.fit)
+    if said := unseen_data(diagnosis):
+        yield html.note(said)
+    yield _further_outputs(diagnosis.fit)
 
 
 def _fit(fit: Fit) -> html.HtmlTable:

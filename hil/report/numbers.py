@@ -67,9 +67,9 @@ def shown(value: float, unit: str = "") -> str:
 
 
 def shown_interval(interval: tuple[float, float]) -> str:
-    """Format an interval, for example ``0.02 … 0.022``."""
+    """Format an interval, for example ``0.02 … 0.022``; one without a width is of a value that no fit moved."""
     low, high = interval
-    return f"{shown(low)} … {shown(high)}"
+    return "held" if low == high else f"{shown(low)} … {shown(high)}"
 
 
 def shown_p(value: float) -> str:

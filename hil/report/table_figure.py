@@ -7,9 +7,8 @@ import plotly.graph_objects as go
 
 from estimator.diagnosis.result import UnnamedTable
 from estimator.diagnosis.table_answer import sentences
-from estimator.physics.curve import curve_over
-from estimator.physics.layout import flat_values, slot
-from estimator.physics.tables import COUNT, Table
+from estimator.diagnosis.table_curves import values_at
+from estimator.physics.tables import Table
 from hil.report import page as html
 from hil.report.figures import LEGEND_PX, PANEL_PX, Style, figure_block
 from hil.report.page import Figure
@@ -26,7 +25,7 @@ def section(table: UnnamedTable, error_unit: str) -> html.Section:
         html.note(
             "The line is the curve"
             + (", with what the line has there by itself, which is dotted" if table.slope else "")
-            + "; the points are its values at the knots with their 95 % intervals; dashed, where no recording has been."
+            + "; the points are its values at the knots with their 95 % intervals; dashed, where no recording was."
         ),
     )
 
@@ -34,19 +33,15 @@ def section(table: UnnamedTable, error_unit: str) -> html.Section:
 def _figure(table: UnnamedTable) -> Figure:
     knots = np.array(table.knots)
     values = np.array(table.values) + table.slope * knots
-    x = np.union1d(np.linspace(knots[0], knots[-1], POINTS), list(table.reached))
-    x = x[(x >= knots[0]) & (x <= knots[-1])]
-    law = Table(table.place, table.knots, table.values)
-    p = flat_values({}, {law.name: {key: value.value for key, value in law.effect().items()}})
-    y, seen = (
-        curve_over(x, p, slot(law.name, COUNT)) + table.slope * x,
-        (x >= table.reached[0]) & (x <= table.reached[1]),
-    )
+    ends = (min(knots[0], table.reached[0]), max(knots[-1], table.reached[1]))
+    x = np.union1d(np.linspace(*ends, POINTS), list(table.reached))
+    y = values_at(Table(table.place, table.knots, table.values), x) + table.slope * x
+    seen = (x >= table.reached[0]) & (x <= table.reached[1])
     colour, width, _ = Style.AFTER.value
     figure = go.Figure()
     if table.slope:
         dotted = {"color": Style.BEFORE.value[0], "width": width, "dash": "dot"}
-        figure.add_trace(go.Scatter(x=knots, y=table.slope * knots, mode="lines", line=dotted, name="the line alone"))
+        figure.add_trace(go.Scatter(x=x, y=table.slope * x, mode="lines", line=dotted, name="the line alone"))
     dashed = {"color": colour, "width": width, "dash": "dash"}
     figure.add_trace(go.Scatter(x=x, y=y, mode="lines", line=dashed, name="beyond the recordings"))
     solid = {"color": colour, "width": 2.2}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -51,25 +51,38 @@ def _words(block: html.Paragraph) -> str:
 
 @dataclass(frozen=True)
 class _Table:
-    """A table whose numbers are whole where the terminal has room for them and for what they are of."""
+    """A table whose numbers are whole where the terminal has room for them and for what they are of.
+
+    Where words have too little room next to them, the headings of numbers go over several lines first.
+    """
 
     block: html.HtmlTable
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        block = self.block
-        columns = [[block.headings[i], *(str(row.cells[i]) for row in block.rows)] for i in block.numbers]
-        numbers = sum(max(map(len, column)) + 2 for column in columns)
-        yield _table(self.block, is_whole=numbers + LEAST_LABELS <= options.max_width)
+        block, room = self.block, options.max_width
+        labels = [i for i, _ in enumerate(block.headings) if i not in block.numbers]
+        words = sum(max(len(word) for cell in [" ", *self._cells(i)] for word in cell.split(" ")) + 2 for i in labels)
+        folded = {i: block.headings[i].replace(" ", "\n") for i in block.numbers}
+        whole, least = (
+            sum(max(map(len, [*headings[i].split("\n"), *self._cells(i)])) + 2 for i in block.numbers)
+            for headings in (block.headings, folded)
+        )
+        is_room = whole + words <= room
+        headings = [each if is_room else folded.get(i, each) for i, each in enumerate(block.headings)]
+        yield _table(block, headings, is_whole=least + LEAST_LABELS <= room)
+
+    def _cells(self, column: int) -> list[str]:
+        return [str(row.cells[column]) for row in self.block.rows]
 
 
-def _table(block: html.HtmlTable, is_whole: bool) -> Table:
+def _table(block: html.HtmlTable, headings: Sequence[str], is_whole: bool) -> Table:
     """Make a table of the columns that hold text."""
-    columns = [i for i, _ in enumerate(block.headings) if any(str(row.cells[i]) for row in block.rows)]
-    table = Table(box=None, pad_edge=False, show_header=any(block.headings))
+    columns = [i for i, _ in enumerate(headings) if any(str(row.cells[i]) for row in block.rows)]
+    table = Table(box=None, pad_edge=False, show_header=any(headings))
     for i in columns:
         is_number = i in block.numbers
         justify: Literal["right", "left"] = "right" if is_number else "left"
-        table.add_column(Text(block.headings[i]), justify=justify, overflow="fold", no_wrap=is_number and is_whole)
+        table.add_column(Text(headings[i]), justify=justify, overflow="fold", no_wrap=is_number and is_whole)
     for row in block.rows:
         style = "dim" if row.kind == "undetermined" else ""
         table.add_row(*(Text(str(row.cells[i])) for i in columns), style=style)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from estimator.diagnosis.result import Counted, Diagnosis, FoundEffect, Mismatch, Verdict
+import math
+
+from estimator.diagnosis.result import Diagnosis, FoundEffect, Mismatch, Verdict
 from estimator.physics.catalogue import title_of
 from estimator.physics.effect import Element
 from estimator.physics.model import Motion, unit
@@ -49,8 +51,13 @@ _DIMENSIONS = {
 
 
 def badge(diagnosis: Diagnosis) -> str:
-    """Return the mark of a verdict; while the input is in doubt, that."""
-    return DOUBTFUL if diagnosis.doubts else BADGES[diagnosis.verdict]
+    """Return the mark of a verdict; while the input is in doubt, that; no tick where names are less than sure."""
+    said = BADGES[diagnosis.verdict]
+    return DOUBTFUL if diagnosis.doubts else said if _are_sure(diagnosis) else f"{said.replace('✓', '≈')}, probably"
+
+
+def _are_sure(diagnosis: Diagnosis) -> bool:
+    return all(effect.counted is None or effect.counted.is_sure for effect in diagnosis.effects)
 
 
 def quantity(output_unit: str) -> str:
@@ -81,17 +88,18 @@ def headline(diagnosis: Diagnosis) -> str:
     if not diagnosis.effort.finished:
         return f"Not decided: the search was ended after {diagnosis.effort.limit_s:.3g} s"
     found = [f"{_with_look_alikes(effect)}{_sure(effect)}" for effect in diagnosis.effects]
+    missing = f"Missing in the model{'' if _are_sure(diagnosis) else ', probably'}: {listed(found)}"
     if diagnosis.verdict is Verdict.EXPLAINED:
-        return f"Missing in the model: {listed(found)}"
+        return missing
     if diagnosis.verdict is Verdict.PARTLY_EXPLAINED:
-        return f"Missing in the model: {listed(found)}; what is left is more than noise"
+        return f"{missing}; what is left is more than noise"
     if diagnosis.verdict is Verdict.NO_MISMATCH:
         return "Nothing is missing: the nominal model, re-tuned, explains the recordings"
     if diagnosis.off_nominal:
         return (
             f"No physics need be missing, but the data sheet is off: {listed([v.name for v in diagnosis.off_nominal])}"
         )
-    return "Something is missing, and no effect of the catalogue explains it"
+    return f"Something is missing, and no effect {diagnosis.effort.fitted} explains it"
 
 
 def _with_look_alikes(effect: FoundEffect) -> str:
@@ -101,12 +109,7 @@ def _with_look_alikes(effect: FoundEffect) -> str:
 
 def _sure(effect: FoundEffect) -> str:
     """Say how often such names were right, in brackets; "" of a fault that was read off the raw data."""
-    return "" if effect.counted is None else f" ({counted_in_words(effect.counted)})"
-
-
-def counted_in_words(counted: Counted) -> str:
-    """Return how often names of such a standing were right, in worlds that chose no threshold."""
-    return f"{counted.right} of {counted.of} such names were right"
+    return "" if effect.counted is None else f" ({effect.counted.words})"
 
 
 def belief(effect: FoundEffect) -> str:
@@ -116,7 +119,20 @@ def belief(effect: FoundEffect) -> str:
     of_which = ", it or a look-alike" if effect.indistinguishable_from else ""
     return (
         f"Without it {effect.necessity:.0%} of the error beyond the noise comes back, on samples not used for the fit; "
-        f"{effect.share:.0%} of the squared error goes with it. {counted_in_words(effect.counted)}{of_which}. "
+        f"{effect.share:.0%} of the squared error goes with it. {effect.counted.words}{of_which}. "
+    )
+
+
+def unseen_data(diagnosis: Diagnosis) -> str:
+    """Say which samples the errors on unseen data are of; "" where there are none."""
+    if not math.isfinite(diagnosis.fit.holdout_retuned):
+        return ""
+    held_out = [trace.name for trace in diagnosis.traces if trace.holdout]
+    if held_out:
+        return f"Unseen data: {listed(held_out)}, held out of every fit."
+    return (
+        "Unseen data: blocks all along the recordings, 30 % of each, of which a further fit of the same model has seen "
+        "nothing."
     )
 
 
@@ -130,7 +146,7 @@ def location_rows(mismatch: Mismatch) -> list[tuple[str, str]]:
         rows.append(("frequency", f"{shown(low)} to {shown(high)} Hz"))
     if mismatch.region is not None:
         region = mismatch.region
-        rows.append((f"where {region.signal} is", f"from {shown(region.low)} to {shown(region.high)}"))
+        rows.append((f"where {region.signal} is", f"from {shown(region.low)} to {shown(region.high, region.unit)}"))
     rows += [(f"time in {name}", shown_times(spans)) for name, spans in mismatch.time_s.items() if spans]
     rows.append(("p-value of the re-tuned model", shown_p(mismatch.p_value)))
     return rows

@@ -206,6 +206,19 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
             "effects.coulomb_friction_motor.friction_nm.ci95 | expected the lower bound first",
         ),
         (
+            "[effects.coulomb_friction_motor]\nfriction_nm = { value = 1, ci95 = [2, 3] }",
+            "effects.coulomb_friction_motor.friction_nm.ci95 | expected the lower bound first, and the value, 1, "
+            "between both | got [2.0, 3.0]",
+        ),
+        (
+            "[effects.coulomb_friction_motor]\nfriction_nm = { value = 1, ci95 = [0.5, inf] }",
+            "effects.coulomb_friction_motor.friction_nm.ci95.1 | expected a finite number | got inf",
+        ),
+        (
+            "[tables.torque]\nknots = [0, 1]\nvalues = [0, 2]\nci95 = [[0, 0], [3, 4]]",
+            "tables.torque.ci95.1 | expected the value there, 2, between both bounds | got [3.0, 4.0]",
+        ),
+        (
             "[effects.coulomb_friction_motor]\nfriction_nm = 3",
             "effects.coulomb_friction_motor.friction_nm | expected a table of value, ci95",
         ),
@@ -262,7 +275,9 @@ def models(draw: st.DrawFn) -> DrivelineModel:
         parameters={name: draw(parameters()) for name in structure.parameter_names},
         effects={
             name: {
-                parameter.name: EffectValue(min(draw(finite), parameter.most), draw(st.none() | pairs))
+                parameter.name: EffectValue(value := min(draw(finite), parameter.most), draw(st.none() | pairs)).at(
+                    value
+                )
                 for parameter in EFFECTS[name].parameters
             }
             for name in chosen

@@ -41,7 +41,7 @@ MISMATCH = Mismatch(
     element=Element.SHAFT,
     time_s={"run_1": ((1.5, 6.2), (17.0, 22.1))},
     band_hz=(6.5, 11.0),
-    region=Region("shaft torque", -20.0, 20.0),
+    region=Region("shaft torque", -20.0, 20.0, "Nm"),
     p_value=0.0,
 )
 

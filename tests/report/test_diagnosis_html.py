@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from estimator.diagnosis.result import Diagnosis, Doubt, Mismatch, OffNominal, Trace, Verdict
+from estimator.diagnosis.result import Counted, Diagnosis, Doubt, Mismatch, OffNominal, Trace, Verdict
 from estimator.physics.effect import Element
 from hil.report.diagnosis_html import MOST_DRAWN, diagnosis_page, interval_bar
 from hil.report.page import IntervalBar
@@ -71,11 +71,12 @@ def test_the_page_says_everything_from_the_verdict_down(diagnosis: Diagnosis) ->
         diagnosis.statement,  # holds characters that HTML has to escape
         "✓ explained",
         "Missing in the model: backlash in the shaft line or hysteresis of the shaft (18 of 18 such "
-        "names were right) and road grade",
+        "names were right: 100 %) and road grade",
         "run_2 has 60 samples missing",
         "1.41 rad/s",
         "0.0521 rad/s",
         "6.5 to 11 Hz",
+        "from -20 to 20 Nm",
         "1.5 to 6.2 s, 17 to 22.1 s",
         "T_S = k e + c",
         "0.02 … 0.022",
@@ -201,7 +202,7 @@ def test_three_recordings_of_a_minute_are_a_page_of_a_megabyte_and_a_half(diagno
 def test_a_law_without_a_name_is_drawn_and_said(diagnosis: Diagnosis) -> None:
     page = diagnosis_page(replace(diagnosis, table=unnamed_table(), effects=()))
     assert "A law without a name" in page
-    assert "On data that no fit has seen the free-run error falls with it from 0.41 to 0.12 rad/s." in page
+    assert "On samples not used for its fit the free-run error falls with it from 0.41 to 0.12 rad/s." in page
     assert "It looks like a dead band of 0.02 rad." in page
     assert "A torque over the torque that is read explains nearly as much." in page
     assert "It does not carry over to run_2." in page
@@ -210,13 +211,31 @@ def test_a_law_without_a_name_is_drawn_and_said(diagnosis: Diagnosis) -> None:
     assert "A law without a name" not in diagnosis_page(diagnosis)
 
 
+def test_errors_on_unseen_data_say_which_data_these_are(diagnosis: Diagnosis) -> None:
+    kept_out = [each.name for each in diagnosis.traces if each.holdout]
+    assert kept_out
+    assert f"Unseen data: {kept_out[0]}, held out of every fit." in diagnosis_page(diagnosis)
+    alone = replace(diagnosis, traces=tuple(each for each in diagnosis.traces if not each.holdout))
+    assert "Unseen data: blocks all along the recordings, 30 % of each" in diagnosis_page(alone)
+
+
 def test_how_much_an_effect_is_needed_and_how_often_such_names_were_right_are_shown(diagnosis: Diagnosis) -> None:
     page = diagnosis_page(diagnosis)
     assert page.count("of the squared error goes with it") == 1
     assert (
         "Without it 97% of the error beyond the noise comes back, on samples not used for the fit; 94% of the squared "
-        "error goes with it. 18 of 18 such names were right, it or a look-alike. Evidence:"
+        "error goes with it. 18 of 18 such names were right: 100 %, it or a look-alike. Evidence:"
     ) in page
+
+
+def test_a_name_that_is_often_wrong_has_no_tick_and_its_share(diagnosis: Diagnosis) -> None:
+    effects = (replace(diagnosis.effects[0], counted=Counted(18, 22)), *diagnosis.effects[1:])
+    page = diagnosis_page(replace(diagnosis, effects=effects))
+    head = page.split("<h2")[0]
+    assert "≈ explained, probably" in head
+    assert "Missing in the model, probably: backlash" in head
+    assert "18 of 22 such names were right: 82 %" in head
+    assert "✓" not in head
 
 
 def test_an_open_doubt_comes_first_without_tick_or_percentage(diagnosis: Diagnosis) -> None:

@@ -56,7 +56,7 @@ def test_where_the_mismatch_is_and_what_it_was_found_to_be_is_written(diagnosis:
         "element": "shaft",
         "time_s": {"run_1": [[1.5, 6.2], [17.0, 22.1]]},
         "band_hz": [6.5, 11.0],
-        "region": {"signal": "shaft torque", "low": -20.0, "high": 20.0},
+        "region": {"signal": "shaft torque", "low": -20.0, "high": 20.0, "unit": "Nm"},
         "p_value": 0.0,
     }
     assert content["effects"][0] == {

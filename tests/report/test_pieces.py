@@ -44,6 +44,7 @@ def test_numbers_are_shown_with_four_digits(value: float, text: str) -> None:
 def test_numbers_carry_their_unit_only_where_there_is_one() -> None:
     assert shown(1.5, "Nm") == "1.5 Nm"
     assert shown_interval((0.02, NAN)) == "0.02 … –"
+    assert shown_interval((0.35, 0.35)) == "held"
     assert [shown_p(0.0), shown_p(0.0123), shown_p(NAN)] == ["< 1e-100", "0.012", "–"]
     assert [shown_ratio(0.5, 0.25), shown_ratio(0.5, 0.0), shown_ratio(NAN, 1.0)] == ["2 ×", "–", "–"]
     assert [shown_ratio(1000.0, 1.0), shown_ratio(1001.0, 1.0)] == ["1e+03 ×", "> 1000 ×"]
@@ -96,6 +97,7 @@ def test_the_terminal_tells_the_verdict_and_what_it_rests_on(diagnosis: Diagnosi
     expected = ("✓ explained", diagnosis.statement, "[rad/s]", "gap_rad", "0.021 rad", "J_M", "1.51 … 1.53")
     expected += ("hardening or softening shaft", "dry friction at the motor", "Note: run_2")
     expected += ("backlash in the shaft line: Without it 97% of the error beyond the noise comes back,",)
+    expected += ("Unseen data: unseen, held out of every fit.",)
     assert "road grade: " not in text  # of which neither is known
     assert [part for part in expected if part not in text] == []
 
@@ -162,3 +164,12 @@ def test_a_narrow_terminal_takes_no_label_from_its_numbers(width: int) -> None:
     letters = "".join(rendered(table, width).split())
     for cell in ("nominal", "given", "augmente", "0.73", "14.7", "0.049"):
         assert cell in letters
+
+
+def test_names_stay_whole_next_to_many_numbers() -> None:
+    """At 80 columns, the headings of the numbers go over two lines."""
+    headings = ("free run", "model", "RMS [rad/s]", "largest", "fit [%]", "load [Nm]", "samples", "p, past torque")
+    rows = [("ce8_prbs1", "augmented.toml", "0.6703", "1.986", "5.713", "-0.5259", "500", "0.0056")]
+    table = terminal.rendered([html.table(headings, rows, numbers=range(2, 8))])
+    *_, names = rendered(table, 80).splitlines()
+    assert names.split() == list(rows[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -150,6 +150,11 @@ class Chain:
         steady = tuple(replace(r, output=r.output - shift) for r, shift in zip(self.records, shifts, strict=True))
         return replace(self, records=steady, findings=(*self.findings, found), shifts=shifts)
 
+    def only(self, names: Collection[str]) -> Chain:
+        """Return the chain with these of its findings alone, its recordings for fits as they are."""
+        findings = tuple(finding for finding in self.findings if finding.name in names)
+        return replace(self, findings=findings, shifts=self.shifts if "sample_jitter" in names else ())
+
     def effects(self) -> dict[str, dict[str, float]]:
         """Values of the parameters of the faults found, by effect and parameter."""
         return {f.name: {name: sized.value for name, sized in f.parameters.items()} for f in self.findings}
@@ -166,18 +171,22 @@ class Chain:
             for each in self.findings
         ]
 
-    def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
-        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
+    def read(self, outputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+        """Return simulated outputs as this chain would have read them, each (N,)."""
         effects, noise = self.effects(), 0.0
         if "speed_quantisation" in effects:
             rounding = effects["speed_quantisation"]["step_rad_s"] ** 2 / 12.0
             noise = math.sqrt(max(noise_floor(self.records) ** 2 - rounding, 0.0))
-        read = [as_read(output, record, effects, noise) for output, record in zip(outputs, self.raw, strict=True)]
-        shifted = [each + shift for each, shift in zip(read, self.shifts, strict=True)] if self.shifts else read
+        read = tuple(as_read(output, record, effects, noise) for output, record in zip(outputs, self.raw, strict=True))
+        return tuple(each + shift for each, shift in zip(read, self.shifts, strict=True)) if self.shifts else read
+
+    def errors(self, outputs: Sequence[FloatArray], within: Sequence[BoolArray] | None = None) -> list[FloatArray]:
+        """Return simulated, as this chain would have read it, less recorded; the good rows of each raw recording."""
         rows = [_read_rows(record, self.findings) for record in self.raw]
         if within is not None:
             rows = [read & inside for read, inside in zip(rows, within, strict=True)]
-        return [(each - record.output)[good] for each, record, good in zip(shifted, self.raw, rows, strict=True)]
+        read = zip(self.read(outputs), self.raw, rows, strict=True)
+        return [(each - record.output)[good] for each, record, good in read]
 
 
 def _added(finding: AcquisitionFinding, output: FloatArray, slope: FloatArray, record: Record) -> float:

@@ -24,7 +24,7 @@ import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.inference.checks import Test, is_possible, tests
-from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs
+from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs, of_spread
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Effects, Hypothesis, covariance, fitted
 from estimator.diagnosis.inference.moves import fit_look_alikes
@@ -37,7 +37,6 @@ from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Structure
 from estimator.physics.fit import not_fitted
 from estimator.physics.model import DrivelineModel, parameter_unit
-from estimator.physics.problem import Problem
 from estimator.physics.steps import from_their_moment
 
 Rival = Callable[[Trial, str], Trial | None]
@@ -115,17 +114,16 @@ def _with_runs(judged: Judged, chain: Chain, unseen: Unseen) -> Decision:
     nothing, believed = judged.nothing.hypothesis, judged.believed.hypothesis
     runs = free_runs(nothing, believed, not judged.failed, chain, unseen)
     findings = acquired(runs)
-    figures = figures_of(runs, judged.noise, findings)
-    of_spread = runs.final.rms / spread(runs.final.problem)
-    verdict = verdict_of(of_spread, bool(judged.named or findings), bool(judged.failed))
+    figures = figures_of(runs, judged.noise)
+    verdict = verdict_of(of_spread(runs.final), bool(judged.named or findings), bool(judged.failed))
     if judged.off_nominal and verdict is Verdict.NO_MISMATCH:
         verdict = Verdict.UNEXPLAINED
     return Decision(judged, runs, figures, findings, verdict)
 
 
-def verdict_of(of_spread: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
+def verdict_of(left: float, is_named: bool, is_more_than_noise: bool) -> Verdict:
     """Return the verdict on a set that leaves an error of so much of the signal's spread (CONTRACT)."""
-    if of_spread > Judging.CLEARLY_BELOW:
+    if left > Judging.CLEARLY_BELOW:
         return Verdict.UNEXPLAINED
     if is_named:
         return Verdict.PARTLY_EXPLAINED if is_more_than_noise else Verdict.EXPLAINED
@@ -137,7 +135,7 @@ def _objection(decision: Decision) -> str:
     if not decision.judged.named:
         return ""
     fit, runs = decision.figures, decision.runs
-    if runs.final.rms > Judging.CLEARLY_BELOW * spread(runs.final.problem):
+    if of_spread(runs.final) > Judging.CLEARLY_BELOW:
         return "it leaves as much as the signal itself"
     if fit.augmented < fit.retuned and fit.holdout_augmented < fit.holdout_retuned:
         return ""
@@ -145,12 +143,6 @@ def _objection(decision: Decision) -> str:
         f"with it the free-run error goes from {fit.retuned:.4g} to {fit.augmented:.4g} {fit.unit}, on samples "
         f"not used for the fit from {fit.holdout_retuned:.4g} to {fit.holdout_augmented:.4g}"
     )
-
-
-def spread(problem: Problem) -> float:
-    """Return the standard deviation of the recorded output, each recording about its mean [unit of the output]."""
-    parts = [record.output[use] for record, use in zip(problem.records, problem.use, strict=True)]
-    return float(np.std(np.concatenate([part - part.mean() for part in parts])))
 
 
 def _failed(hypothesis: Hypothesis) -> tuple[Test, ...]:

@@ -197,6 +197,15 @@ class FreeRuns:
         return self.before.first_outputs()
 
     @cached_property
+    def as_read(self) -> FitResult:
+        """The same, re-tuned to the recordings as they were read where a fault of their acquisition matters."""
+        return (
+            fit(replace(self.retuned.problem, records=self.chain.raw), self.retuned.x)
+            if self.chain.findings
+            else self.retuned
+        )
+
+    @cached_property
     def final(self) -> FitResult:
         """The nominal model with the effects believed: the recordings' first outputs."""
         return self.after.first_outputs()
@@ -231,13 +240,33 @@ def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: 
     The re-tuned model leaves the least that it can: an error that it need not have is no mismatch.
     """
     before = _least(on_recordings(nothing, unseen.line, chain.separated, is_whole=False), unseen.line)
+    after = before if believed is nothing else on_recordings(believed, unseen.line, chain.separated, is_whole)
+    matter = _that_matter(chain, after.first_outputs())
+    chain, unseen = chain.only(matter), replace(unseen, chain=unseen.chain.only(matter))
     held_before = unseen.rms(nothing, before, False, chain, is_as_read=False)
-    if believed is nothing:
-        held_after = unseen.rms(nothing, before, False, chain, is_as_read=True) if chain.findings else held_before
-        return FreeRuns(chain, unseen, believed, is_whole, before, before, held_before, held_after)
-    after = on_recordings(believed, unseen.line, chain.separated, is_whole)
-    held_after = unseen.rms(believed, after, is_whole, chain, is_as_read=True)
+    is_the_same = believed is nothing and not matter
+    held_after = held_before if is_the_same else unseen.rms(believed, after, is_whole, chain, is_as_read=True)
     return FreeRuns(chain, unseen, believed, is_whole, before, after, held_before, held_after)
+
+
+def of_spread(final: FitResult) -> float:
+    """Return the RMS of a free run's error over the standard deviation of what was recorded, each about its mean."""
+    pairs = zip(final.problem.records, final.problem.use, strict=True)
+    parts = [record.output[use] for record, use in pairs]
+    return final.rms / float(np.std(np.concatenate([part - part.mean() for part in parts])))
+
+
+def _that_matter(chain: Chain, final: FitResult) -> set[str]:
+    """Return which faults of the acquisition are reported: that add more than a trace of the squared error.
+
+    None where the free run leaves as much as the signal itself: nothing is established then.
+    """
+    if of_spread(final) > Judging.CLEARLY_BELOW:
+        return set()
+    errors = [(out - raw.output)[raw.okay] for out, raw in zip(final.outputs, chain.raw, strict=True)]
+    least = Judging.LEAST_SHARE * sum(float(error @ error) for error in errors)
+    added = zip(chain.findings, chain.added_squares(final), strict=True)
+    return {finding.name for finding, squares in added if squares >= least}
 
 
 def _least(retuned: FitResult, line: DrivelineModel) -> FitResult:
@@ -276,26 +305,22 @@ def figures_without(chain: Chain, line: DrivelineModel, nothing: Hypothesis | No
 
 
 def acquired(runs: FreeRuns) -> tuple[FoundEffect, ...]:
-    """Return faults of the acquisition that matter: that add more than a trace of the squared error."""
+    """Return faults of the acquisition that matter."""
     chain = runs.chain
     if not chain.findings:
         return ()
     before = [(out - raw.output)[raw.okay] for out, raw in zip(runs.final.outputs, chain.raw, strict=True)]
-    least = Judging.LEAST_SHARE * sum(float(error @ error) for error in before)
-    added = zip(chain.findings, chain.added_squares(runs.final), strict=True)
-    findings = [finding for finding, squares in added if squares >= least]
-    return acquired_effects(findings, before, chain.errors(runs.final.outputs))
+    return acquired_effects(chain.findings, before, chain.errors(runs.final.outputs))
 
 
-def figures_of(runs: FreeRuns, noise: float, findings: Sequence[FoundEffect]) -> Fit:
-    """Return the RMS errors that are reported [unit of the output], those of the nominal model by the raw readings."""
+def figures_of(runs: FreeRuns, noise: float) -> Fit:
+    """Return the RMS errors that are reported [unit of the output], all by the raw readings."""
     chain, line, retuned = runs.chain, runs.unseen.line, runs.retuned
-    as_read = fit(replace(retuned.problem, records=chain.raw), retuned.x) if chain.findings else retuned
     return Fit(
         unit=unit(DIMENSIONS[chain.raw[0].kind], line.motion),
         nominal=fit(make_problem(line, chain.raw, (), grid=retuned.problem.grid)).rms,
-        retuned=as_read.rms,
-        augmented=rms_of(chain.errors(runs.final.outputs)) if chain.findings else runs.final.rms,
+        retuned=rms_of(chain.only(()).errors(runs.as_read.outputs)),
+        augmented=rms_of(chain.errors(runs.final.outputs)),
         holdout_retuned=runs.held_before,
         holdout_augmented=runs.held_after,
         noise_floor=noise,
@@ -329,7 +354,7 @@ def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
     def nominal(records: Sequence[Record]) -> tuple[FloatArray, ...]:
         return fit(make_problem(line, records, (), grid=grid)).outputs
 
-    outputs = (nominal(runs.chain.records), runs.retuned.outputs, runs.final.outputs)
+    outputs = (nominal(runs.chain.records), runs.as_read.outputs, runs.chain.read(runs.final.outputs))
     traces = [_trace(record, each, False) for record, *each in zip(runs.chain.raw, *outputs, strict=True)]
     if kept_out:
         use = all_good_samples(kept_out)

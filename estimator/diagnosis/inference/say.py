@@ -84,8 +84,8 @@ def said(basis: Basis) -> Diagnosis:
     seen = None
     if verdict is not Verdict.NO_MISMATCH and line.plant is None:
         nothing, believed = (each.hypothesis.result.first_outputs() for each in (judged.nothing, judged.believed))
-        seen = discrepancy(nothing, believed, judged.noise, line.motion)
-    mismatch, remainder = _mismatch(basis, seen), _remainder(judged, law)
+        seen = discrepancy(nothing, believed if law is None else law.found.result, judged.noise, line.motion)
+    mismatch, remainder = _mismatch(basis, seen), _remainder(decision, law)
     untestable = untestable_effects(open_hypotheses(line, runs.chain.records)[1])
     context = Context(
         remainder,
@@ -267,18 +267,19 @@ def _mismatch(basis: Basis, seen: Discrepancy | None) -> Mismatch:
         element=element,
         time_s=locate.intervals(result, noise),
         band_hz=locate.band_hz(result, noise),
-        region=None if element is None else locate.region(result, element, noise),
+        region=None if element is None else locate.region(result, element, noise, basis.model.motion),
         p_value=max(math.exp(-0.5 * gained), Noise.SMALLEST_P),
     )
 
 
-def _remainder(judged: Judged, law: Law | None) -> Remainder | None:
+def _remainder(decision: Decision, law: Law | None) -> Remainder | None:
+    judged = decision.judged
     if not judged.failed:
         return None
     noise, left = judged.noise, judged.believed.rms
     return Remainder(
         share=min(max(left**2 - noise**2, 0.0) / judged.nothing.rms**2, 1.0),
-        times_noise=left / noise,
+        times_noise=decision.figures.augmented / noise,
         element=None if law is None else law.table.element,
         band_hz=locate.band_hz(judged.believed.hypothesis.result.first_outputs(), noise),
         law=tests_in_words(judged.failed) + ("" if law is None else f"; it follows a torque over {law.table.over}"),
@@ -319,8 +320,8 @@ def _as_tried(name: str, tried: Iterable[Trial], believed: Trial) -> str:
     best = min(holding, key=lambda each: each.rms)
     count, of_believed = (f"{len(each.effects)} effect{'s' * (len(each.effects) != 1)}" for each in (best, believed))
     said = (
-        f"tried: it leaves {best.rms:.3g} on samples not used for the fit, with {count}; what is believed leaves "
-        f"{believed.rms:.3g} with {of_believed}"
+        f"tried: with {count} it leaves {best.rms / believed.rms:.3g} times the error of what is believed, with "
+        f"{of_believed}, on samples not used for the fit"
     )
     if best.rms >= believed.rms:
         return said

@@ -61,6 +61,8 @@ def statement(
     parts.append(_headline(verdict, fit, effects, effort, context))
     if context.remainder is not None and not context.off_nominal:
         parts.append(_left(verdict, context.remainder, context.element))
+    if effort.finished and effort.untried and context.remainder is not None and not context.off_nominal:
+        parts.append(_not_all_fitted(effort))
     if context.traces:
         for reason in dict.fromkeys(each.reason for each in context.traces):
             titles = [title_of(each.name) for each in context.traces if each.reason == reason]
@@ -103,6 +105,15 @@ def _not_decided(effort: Effort) -> str:
     return f"Not decided: the search was ended after {effort.limit_s:.3g} s{left}."
 
 
+def _not_all_fitted(effort: Effort) -> str:
+    """Say which effects might explain what is left, as far as anybody has looked, and how one of them is fitted."""
+    return (
+        f"Not all effects were fitted, and one of these may be the cause: {', '.join(map(title_of, effort.untried))}. "
+        f"Others promised more. To have one fitted, write it into the model file as [effects.{effort.untried[0]}] or "
+        "the like, its values with a tolerance, and diagnose again."
+    )
+
+
 def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort: Effort, context: Context) -> str:
     model = "re-tuned inside its tolerances, the nominal model" if context.can_be_retuned else "the model"
     noise = f" at a noise of {fit.noise_floor:.3g} {fit.unit}" if math.isfinite(fit.noise_floor) else ""
@@ -119,7 +130,7 @@ def _headline(verdict: Verdict, fit: Fit, effects: Sequence[FoundEffect], effort
         return _wrong_values(left, context.off_nominal)
     if verdict is Verdict.UNEXPLAINED:
         also = f" Found in the acquisition, and not the cause: {found}." if effects else ""
-        return f"Something is missing in the model, and no effect of the catalogue explains it: {left}.{also}"
+        return f"Something is missing in the model, and no effect {effort.fitted} explains it: {left}.{also}"
     part = "the mismatch" if verdict is Verdict.EXPLAINED else "part of the mismatch"
     return f"Missing in the model{how_sure(effects)}: {found}. This explains {part}: {_fall(fit)}."
 
@@ -161,7 +172,8 @@ def how_sure(effects: Sequence[FoundEffect]) -> str:
     if not counts:
         return ""
     least = min(counts, key=lambda each: each.probability)
-    return f" ({least.right} of {least.of} such names were right)"
+    together = ", each by itself" if len(counts) > 1 else ""
+    return f"{'' if least.is_sure else ', probably'} ({least.words}{together})"
 
 
 def _wrong_values(left: str, off_nominal: Sequence[OffNominal]) -> str:
@@ -209,4 +221,5 @@ def _left(verdict: Verdict, remainder: Remainder, element: Element | None) -> st
             f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.law}."
         )
     where = "" if element is None else f" Most likely it acts {PLACES[element]}."
-    return f"What is left is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"
+    left = "What is left" if remainder.element is None else "What is left without the law that has no name"
+    return f"{left} is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"

@@ -18,17 +18,18 @@ from estimator.identification.spectral import SpectralEstimate, spectral_estimat
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
-from estimator.physics.model import Structure
+from estimator.physics.model import Motion as Kind, Structure, unit
 from estimator.signals.record import FloatArray, Record
 
-_SIGNAL_NAMES = {
-    Element.TORQUE_PATH: "torque",
-    Element.MOTOR: "motor speed",
-    Element.SHAFT: "shaft torque",
-    Element.LOAD: "load speed",
-    Element.SPEED_SENSOR: "motor speed",
-    Element.ACQUISITION: "motor speed",
+_SIGNALS = {
+    Element.TORQUE_PATH: ("torque", "torque"),
+    Element.MOTOR: ("motor speed", "speed"),
+    Element.SHAFT: ("shaft torque", "torque"),
+    Element.LOAD: ("load speed", "speed"),
+    Element.SPEED_SENSOR: ("motor speed", "speed"),
+    Element.ACQUISITION: ("motor speed", "speed"),
 }
+"""Name and dimension of the signal that says where in an element's range something is."""
 
 
 def error_spectrum(before: FitResult, after: FitResult, floor: float) -> ErrorSpectrum:
@@ -210,7 +211,7 @@ def band_hz(result: FitResult, noise: float) -> Interval | None:
     return _central(frequency, weight) if weight.any() else None
 
 
-def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
+def region(result: FitResult, element: Element, floor: float = 0.0, kind: Kind = Kind.ROTATION) -> Region:
     """Return where a mismatch is: the range of the element's signal that holds the central part of its power."""
     values, weights = [], []
     for i in range(len(result.problem.records)):
@@ -221,7 +222,8 @@ def region(result: FitResult, element: Element, floor: float = 0.0) -> Region:
         w = np.concatenate([_window_power(result, i)[0] for i in range(len(result.problem.records))])
     order = np.argsort(x)
     low, high = _central(x[order], w[order])
-    return Region(_SIGNAL_NAMES[element], low, high)
+    signal, dimension = _SIGNALS[element]
+    return Region(signal, low, high, unit(dimension, kind))
 
 
 def _signal(element: Element, motion: Motion, result: FitResult) -> FloatArray:

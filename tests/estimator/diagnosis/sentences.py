@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.wording import times
@@ -20,7 +21,7 @@ def near(text: str, value: float) -> bool:
 
 def contradictions(found: Diagnosis) -> list[str]:
     """Return every sentence that says another thing than the numbers; none where all is well."""
-    return [*_errors(found), *_what_is_left(found), *_names(found), *_rejected(found)]
+    return [*_errors(found), *_drawn(found), *_what_is_left(found), *_names(found), *_rejected(found)]
 
 
 def _errors(found: Diagnosis) -> Iterator[str]:
@@ -43,6 +44,18 @@ def _errors(found: Diagnosis) -> Iterator[str]:
             yield f"an error of {error} at a noise of {noise}: {fit.retuned} and {fit.noise_floor}"
 
 
+def _drawn(found: Diagnosis) -> Iterator[str]:
+    """Hold what is drawn of the recordings against the errors in figures."""
+    drawn = [each for each in found.traces if not each.holdout]
+    lost = any(each.name == "lost_samples" for each in found.effects)  # drawn, and no error of the augmented model
+    for model in ("retuned",) if lost else ("retuned", "augmented"):
+        errors = [(getattr(each, model) - each.measured)[each.okay] for each in drawn]
+        if errors and (rms := float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))) != pytest.approx(
+            getattr(found.fit, model), rel=1e-6
+        ):
+            yield f"{model}: drawn with an error of {rms}, and the fit says {getattr(found.fit, model)}"
+
+
 def _what_is_left(found: Diagnosis) -> Iterator[str]:
     left = found.remainder
     for share in re.findall(r"(\d+) % of the squared error is left", found.statement):
@@ -53,6 +66,8 @@ def _what_is_left(found: Diagnosis) -> Iterator[str]:
     for many in re.findall(r"([\d.,]+) times the noise", found.statement):
         if left is None or many != times(left.times_noise):
             yield f"{many} times the noise: {left}"
+        elif found.table is None and not near(many, found.fit.augmented / found.fit.noise_floor):
+            yield f"{many} times the noise, and the augmented model leaves {found.fit}"
 
 
 def _names(found: Diagnosis) -> Iterator[str]:
@@ -79,6 +94,6 @@ def _rejected(found: Diagnosis) -> Iterator[str]:
     for each in found.rejected:
         if "better by" in each.reason or each.delta_bic > 0.0:
             yield f"{each.name} is rejected: {each.reason} ({each.delta_bic:+.3g})"
-        for left, believed in re.findall(rf"it leaves {NUMBER} on .*; what is believed leaves {NUMBER} ", each.reason):
-            if (float(left) < float(believed)) and ": less, but" not in each.reason:
+        for left in re.findall(rf"it leaves {NUMBER} times the error of what is believed", each.reason):
+            if float(left) < 1.0 and ": less, but" not in each.reason:
                 yield f"{each.name} is rejected: {each.reason}"

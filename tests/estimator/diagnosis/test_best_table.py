@@ -52,6 +52,7 @@ def test_a_gap_is_found_as_a_curve_over_the_twist_without_the_catalogue() -> Non
     assert law.not_carried == ()  # on each recording it is better by a fit to the other one
     assert law.rms_after < 0.5 * law.rms_before
     assert found.result.rms < 0.5 * hypothesis.result.rms
+    assert law.reached == pytest.approx((law.knots[0], law.knots[-1]), rel=1e-3)  # no knot beyond what was simulated
     inside = np.abs(law.knots) < 0.008
     total = np.array(law.values) + law.slope * np.array(law.knots)
     assert np.max(np.abs(total[inside])) < 0.3 * TWO_MASS["k"] * 0.008
@@ -69,6 +70,9 @@ def test_a_clutch_that_slips_is_found_as_a_torque_that_yields() -> None:
     assert found.law.rms_after < 0.2 * found.law.rms_before
     assert found.effects["shaft_hysteresis"]["friction_nm"].value == pytest.approx(45.0, rel=0.05)
     assert found.law.looks_like.startswith("a clutch that slips at 4")
+    reached, (first, *_, last) = found.law.reached, found.law.knots
+    assert (first, last) == pytest.approx((min(reached[0], 0.0), max(reached[1], 0.0)))
+    assert reached[1] - reached[0] > 0.2  # it slips further than a shaft of 45 Nm turns
 
 
 def test_a_line_that_lacks_nothing_gets_no_law() -> None:

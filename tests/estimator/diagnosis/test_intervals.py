@@ -109,6 +109,20 @@ def test_an_effects_parameter_at_its_bound_is_held_there() -> None:
     assert cov[0, 0] > 0.0
 
 
+def test_what_is_reported_of_it_goes_one_way_from_the_bound() -> None:
+    """By as much as without the bound; all else is known as well as with the parameter held."""
+    rng = np.random.default_rng(3)
+    design = rng.standard_normal((400, 2))
+    data = [design @ [0.2, 1.1] + rng.standard_normal(400)]
+    at, beyond = (regression([design], data, bound=bound, effect="backlash") for bound in (1.0, 2.0))
+    assert at.x[1] == 1.0 < beyond.x[1]
+    cov, free = reported_covariance(at), reported_covariance(beyond)
+    np.testing.assert_array_equal(cov[0, 1:], 0.0)
+    low, high = interval(at, cov, 1)
+    assert high == 1.0
+    assert 1.0 - low == pytest.approx(Z95 * np.sqrt(free[1, 1]), rel=0.1)
+
+
 class TestReported:
     """White errors of the regression's own, and in addition one that keeps its value for a second."""
 

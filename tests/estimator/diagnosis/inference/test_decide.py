@@ -15,7 +15,7 @@ FRICTION, GENERAL, DRAG = "coulomb_friction_motor", "stribeck_friction", "quadra
 
 
 @pytest.mark.parametrize(
-    ("of_spread", "is_named", "is_more_than_noise", "expected"),
+    ("left", "is_named", "is_more_than_noise", "expected"),
     [
         (0.1, True, False, Verdict.EXPLAINED),
         (0.1, True, True, Verdict.PARTLY_EXPLAINED),
@@ -26,9 +26,9 @@ FRICTION, GENERAL, DRAG = "coulomb_friction_motor", "stribeck_friction", "quadra
     ],
 )
 def test_nothing_is_explained_that_leaves_as_much_as_the_signal_itself(
-    of_spread: float, is_named: bool, is_more_than_noise: bool, expected: Verdict
+    left: float, is_named: bool, is_more_than_noise: bool, expected: Verdict
 ) -> None:
-    assert verdict_of(of_spread, is_named, is_more_than_noise) is expected
+    assert verdict_of(left, is_named, is_more_than_noise) is expected
 
 
 @pytest.fixture(scope="module")

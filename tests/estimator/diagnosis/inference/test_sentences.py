@@ -100,14 +100,14 @@ def test_what_is_named_is_the_model_and_what_is_not_is_none_of_it(answered: Answ
     assert set(found.augmented.effects) - tables == established == judged.believed.effects
     for effect in found.effects:
         assert effect.counted is not None
-        assert f"({effect.counted.right} of {effect.counted.of} such names were right)" in found.statement
+        assert f"({effect.counted.words}" in found.statement
 
 
 def test_what_is_left_is_what_the_believed_set_leaves(answered: Answered) -> None:
-    found, judged = answered.diagnosis, answered.decision.judged
+    found, judged, figures = answered.diagnosis, answered.decision.judged, answered.decision.figures
     assert (found.remainder is None) is (not judged.failed)
     for times in re.findall(r"(\S+) times the noise", found.statement):
-        assert float(times) == pytest.approx(judged.believed.rms / judged.noise, rel=5e-3)
+        assert float(times) == pytest.approx(figures.augmented / judged.noise, rel=5e-3)
 
 
 def test_two_inverters_are_no_cause_where_one_is_read(answered: Answered) -> None:

@@ -11,6 +11,7 @@ import pytest
 from estimator.diagnosis.inference.decide import verdict_of
 from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Counted, Effort, Evidence, Fit, FoundEffect, Remainder, Verdict
+from estimator.physics.catalogue import title_of
 from estimator.physics.effect import Element
 
 ERRORS = (0.0499, 0.05, 35.5, 35.50001)
@@ -60,3 +61,26 @@ def says_what_its_numbers_say(
     assert ("Nothing is missing" in said) is (verdict is Verdict.NO_MISMATCH and effort.finished)
     if not effort.finished:
         assert "after 1 s, 2 of 40 effects untried, among them backlash in the shaft line, gravity" in said
+
+
+def test_an_unexplained_statement_says_which_effects_were_not_fitted_and_how_one_is() -> None:
+    fit = Fit("rad/s", 1.0, 0.9, 0.9, 0.9, 0.9, 0.05)
+    left = Context(Remainder(1.0, 18.0, None, None, "has a line in its spectrum"))
+    said = statement(Verdict.UNEXPLAINED, fit, (), Effort(untried=("gravity", "eddy_drag")), left)
+    assert "no effect of the catalogue that was fitted explains it" in said
+    assert (
+        f"Not all effects were fitted, and one of these may be the cause: {title_of('gravity')}, drag that levels off."
+        in said
+    )
+    assert "[effects.gravity]" in said
+    assert "Not all effects were fitted" not in statement(Verdict.UNEXPLAINED, fit, (), Effort(), left)
+
+
+def test_a_name_that_is_often_wrong_is_said_with_a_probably_and_its_share() -> None:
+    fit = Fit("rad/s", 1.0, 0.9, 0.05, 0.9, 0.05, 0.05)
+    unsure, sure = effect("backlash", Counted(18, 22)), effect("gravity", Counted(85, 86))
+    alone = statement(Verdict.EXPLAINED, fit, (unsure,), Effort())
+    assert alone.startswith("Missing in the model, probably (18 of 22 such names were right: 82 %): there is")
+    both = statement(Verdict.EXPLAINED, fit, (sure, unsure), Effort())
+    assert "(18 of 22 such names were right: 82 %, each by itself)" in both
+    assert statement(Verdict.EXPLAINED, fit, (sure,), Effort()).startswith("Missing in the model (85 of 86")
