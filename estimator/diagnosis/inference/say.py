@@ -95,10 +95,17 @@ def said(basis: Basis) -> Diagnosis:
         untestable,
         can_be_retuned(line),
         mismatch.element,
+        None if seen is None else seen.element,
         basis.doubts,
     )
     is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
     said_of_law = NO_LAW if is_without else "" if law is None else sentences(law.table, decision.figures.unit)
+    parameters = retuned_parameters(runs.estimate, runs.covariance, line, is_explained)
+    loads = load_torques(runs.estimate, runs.covariance, line)
+    if law is not None:
+        augmented, courses = law.augmented(augmented), law.drawn(courses, judged.believed.hypothesis, runs)
+        parameters = {name: each.at(augmented.parameters[name].value) for name, each in parameters.items()}
+        loads = load_torques(law.final, reported_covariance(law.final), line)
     return Diagnosis(
         verdict=verdict,
         statement=f"{statement(verdict, decision.figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
@@ -107,11 +114,11 @@ def said(basis: Basis) -> Diagnosis:
         rejected=_rejected(basis),
         untestable=untestable,
         fit=decision.figures if law is None else law.fit,
-        parameters=retuned_parameters(runs.estimate, runs.covariance, line, is_explained),
-        load_torque=load_torques(runs.estimate, runs.covariance, line),
+        parameters=parameters,
+        load_torque=loads,
         timing_s={},
-        augmented=augmented if law is None else law.augmented(augmented),
-        traces=courses if law is None else law.drawn(courses, judged.believed.hypothesis, runs),
+        augmented=augmented,
+        traces=courses,
         warnings=basis.warnings,
         doubts=tuple(basis.doubts),
         discrepancy=seen,

@@ -49,6 +49,7 @@ class Context:
     untestable: Sequence[UntestableEffect] = ()  # effects that these recordings can't show
     can_be_retuned: bool = True  # false for a plant whose parameters are not fitted
     element: Element | None = None  # where the mismatch most likely is
+    alone: Element | None = None  # where an input by itself would most likely act
     doubts: Sequence[Doubt] = ()  # about the input: they come first
 
 
@@ -60,7 +61,7 @@ def statement(
     parts += [] if effort.finished else [_not_decided(effort)]
     parts.append(_headline(verdict, fit, effects, effort, context))
     if context.remainder is not None and not context.off_nominal:
-        parts.append(_left(verdict, context.remainder, context.element))
+        parts.append(_left(verdict, context.remainder, context.element, context.alone))
     if effort.finished and effort.untried and context.remainder is not None and not context.off_nominal:
         parts.append(_not_all_fitted(effort))
     if context.traces:
@@ -213,13 +214,14 @@ def off_the_sheet(off_nominal: Sequence[OffNominal]) -> str:
     return " and ".join(parts)
 
 
-def _left(verdict: Verdict, remainder: Remainder, element: Element | None) -> str:
+def _left(verdict: Verdict, remainder: Remainder, element: Element | None, alone: Element | None) -> str:
     noise = times(remainder.times_noise)
     if verdict is Verdict.PARTLY_EXPLAINED:
         share = f"{remainder.share:.0%}".replace("%", " %")
         return (
             f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.law}."
         )
-    where = "" if element is None else f" Most likely it acts {PLACES[element]}."
+    other = "" if alone in (None, element) else f"; an input by itself would most likely act {PLACES[alone]}"
+    where = "" if element is None else f" Most likely it acts {PLACES[element]}{other}."
     left = "What is left" if remainder.element is None else "What is left without the law that has no name"
     return f"{left} is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"

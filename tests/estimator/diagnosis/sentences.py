@@ -80,6 +80,9 @@ def _names(found: Diagnosis) -> Iterator[str]:
             yield f"{effect.name}: {effect.probability} is more than was counted"
     tables = set() if found.table is None else {f"table_{found.table.place}"}
     in_model = set(found.augmented.effects) - tables
+    for name, parameter in found.parameters.items():
+        if found.augmented.parameters[name].value != pytest.approx(parameter.value):
+            yield f"{name}: {parameter}, and in the model {found.augmented.parameters[name]}"
     if twice := (names | in_model) & {each.name for each in (*found.rejected, *found.refinements)}:
         yield f"in the model and out of it: {', '.join(sorted(twice))}"
     if ("Not established, and not in the model: " in said) is not bool(found.refinements):

@@ -84,3 +84,13 @@ def test_a_name_that_is_often_wrong_is_said_with_a_probably_and_its_share() -> N
     both = statement(Verdict.EXPLAINED, fit, (sure, unsure), Effort())
     assert "(18 of 22 such names were right: 82 %, each by itself)" in both
     assert statement(Verdict.EXPLAINED, fit, (sure,), Effort()).startswith("Missing in the model (85 of 86")
+
+
+def test_two_places_that_differ_are_both_said() -> None:
+    fit = Fit("rad/s", 1.0, 0.9, 0.9, 0.9, 0.9, 0.05)
+    left = Remainder(1.0, 18.0, Element.SHAFT, None, "has a line in its spectrum")
+    both = Context(left, element=Element.SHAFT, alone=Element.LOAD)
+    said = statement(Verdict.UNEXPLAINED, fit, (), Effort(), both)
+    assert "Most likely it acts in the shaft; an input by itself would most likely act at the load." in said
+    alike = statement(Verdict.UNEXPLAINED, fit, (), Effort(), replace(both, alone=Element.SHAFT))
+    assert "Most likely it acts in the shaft." in alike
