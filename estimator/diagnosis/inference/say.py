@@ -86,7 +86,10 @@ def said(basis: Basis) -> Diagnosis:
         nothing, believed = (each.hypothesis.result.first_outputs() for each in (judged.nothing, judged.believed))
         seen = discrepancy(nothing, believed if law is None else law.found.result, judged.noise, line.motion)
     mismatch, remainder = _mismatch(basis, seen), _remainder(decision, law)
-    untestable = untestable_effects(open_hypotheses(line, runs.chain.records)[1])
+    rejected, standings = _rejected(basis), (*judged.named, *judged.traces, *judged.refinements)
+    looked_at = {other for each in standings for other in (each.name, *each.alike)} | {each.name for each in rejected}
+    blind = open_hypotheses(line, runs.chain.records)[1]  # behind a sensor blind for the sign more is tried than these
+    untestable = untestable_effects({name: why for name, why in blind.items() if name not in looked_at})
     context = Context(
         remainder,
         slight,
@@ -111,7 +114,7 @@ def said(basis: Basis) -> Diagnosis:
         statement=f"{statement(verdict, decision.figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
         mismatch=mismatch,
         effects=effects,
-        rejected=_rejected(basis),
+        rejected=rejected,
         untestable=untestable,
         fit=decision.figures if law is None else law.fit,
         parameters=parameters,

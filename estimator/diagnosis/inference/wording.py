@@ -217,7 +217,7 @@ def off_the_sheet(off_nominal: Sequence[OffNominal]) -> str:
 def _left(verdict: Verdict, remainder: Remainder, element: Element | None, alone: Element | None) -> str:
     noise = times(remainder.times_noise)
     if verdict is Verdict.PARTLY_EXPLAINED:
-        share = f"{remainder.share:.0%}".replace("%", " %")
+        share = f"{100.0 * remainder.share:.0f} %" if remainder.share >= 0.005 else "Less than 1 %"
         return (
             f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.law}."
         )

@@ -21,7 +21,7 @@ def near(text: str, value: float) -> bool:
 
 def contradictions(found: Diagnosis) -> list[str]:
     """Return every sentence that says another thing than the numbers; none where all is well."""
-    return [*_errors(found), *_drawn(found), *_what_is_left(found), *_names(found), *_rejected(found)]
+    return [*_errors(found), *_drawn(found), *_what_is_left(found), *_names(found), *_lists(found), *_rejected(found)]
 
 
 def _errors(found: Diagnosis) -> Iterator[str]:
@@ -58,8 +58,8 @@ def _drawn(found: Diagnosis) -> Iterator[str]:
 
 def _what_is_left(found: Diagnosis) -> Iterator[str]:
     left = found.remainder
-    for share in re.findall(r"(\d+) % of the squared error is left", found.statement):
-        if left is None or abs(float(share) - 100.0 * left.share) > 0.5 + 1e-9:
+    for less, share in re.findall(r"(Less than )?(\d+) % of the squared error is left", found.statement):
+        if left is None or abs(0.0 if less else float(share) - 100.0 * left.share) > 0.5 + 1e-9:
             yield f"{share} % is left: {left}"
         if found.verdict is not Verdict.PARTLY_EXPLAINED:
             yield f"{share} % is left, and the verdict is {found.verdict.value}"
@@ -80,9 +80,6 @@ def _names(found: Diagnosis) -> Iterator[str]:
             yield f"{effect.name}: {effect.probability} is more than was counted"
     tables = set() if found.table is None else {f"table_{found.table.place}"}
     in_model = set(found.augmented.effects) - tables
-    for name, parameter in found.parameters.items():
-        if found.augmented.parameters[name].value != pytest.approx(parameter.value):
-            yield f"{name}: {parameter}, and in the model {found.augmented.parameters[name]}"
     if twice := (names | in_model) & {each.name for each in (*found.rejected, *found.refinements)}:
         yield f"in the model and out of it: {', '.join(sorted(twice))}"
     if ("Not established, and not in the model: " in said) is not bool(found.refinements):
@@ -91,6 +88,15 @@ def _names(found: Diagnosis) -> Iterator[str]:
         shown = {each.name for each in (*found.effects, *found.rejected, *found.refinements, *found.slight)}
         if "inverter_gain_mismatch" in shown or re.search(r"\b(inverters? m[12]|in m2)\b", said):
             yield "a second inverter, where one input is read"
+
+
+def _lists(found: Diagnosis) -> Iterator[str]:
+    """Hold the lists of a diagnosis against each other."""
+    for name, parameter in found.parameters.items():
+        if found.augmented.parameters[name].value != pytest.approx(parameter.value):
+            yield f"{name}: {parameter}, and in the model {found.augmented.parameters[name]}"
+    if both := {each.name for each in found.effects} & {each.name for each in found.untestable}:
+        yield f"named, and neither found nor excluded: {', '.join(sorted(both))}"
 
 
 def _rejected(found: Diagnosis) -> Iterator[str]:
