@@ -61,7 +61,8 @@ class _Table:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         block, room = self.block, options.max_width
         labels = [i for i, _ in enumerate(block.headings) if i not in block.numbers]
-        words = sum(max(len(word) for cell in [" ", *self._cells(i)] for word in cell.split(" ")) + 2 for i in labels)
+        longest = {i: max(len(word) for cell in [" ", *self._cells(i)] for word in cell.split(" ")) for i in labels}
+        words = sum(longest.values()) + 2 * len(longest)
         folded = {i: block.headings[i].replace(" ", "\n") for i in block.numbers}
         whole, least = (
             sum(max(map(len, [*headings[i].split("\n"), *self._cells(i)])) + 2 for i in block.numbers)
@@ -69,20 +70,22 @@ class _Table:
         )
         is_room = whole + words <= room
         headings = [each if is_room else folded.get(i, each) for i, each in enumerate(block.headings)]
-        yield _table(block, headings, is_whole=least + LEAST_LABELS <= room)
+        fewest = longest if least + words <= room else {}
+        yield _table(block, headings, fewest, is_whole=least + LEAST_LABELS <= room)
 
     def _cells(self, column: int) -> list[str]:
         return [str(row.cells[column]) for row in self.block.rows]
 
 
-def _table(block: html.HtmlTable, headings: Sequence[str], is_whole: bool) -> Table:
-    """Make a table of the columns that hold text."""
+def _table(block: html.HtmlTable, headings: Sequence[str], fewest: Mapping[int, int], is_whole: bool) -> Table:
+    """Make a table of the columns that hold text, some of them at least so wide."""
     columns = [i for i, _ in enumerate(headings) if any(str(row.cells[i]) for row in block.rows)]
     table = Table(box=None, pad_edge=False, show_header=any(headings))
     for i in columns:
         is_number = i in block.numbers
         justify: Literal["right", "left"] = "right" if is_number else "left"
-        table.add_column(Text(headings[i]), justify=justify, overflow="fold", no_wrap=is_number and is_whole)
+        whole = is_number and is_whole
+        table.add_column(Text(headings[i]), justify=justify, overflow="fold", no_wrap=whole, min_width=fewest.get(i))
     for row in block.rows:
         style = "dim" if row.kind == "undetermined" else ""
         table.add_row(*(Text(str(row.cells[i])) for i in columns), style=style)

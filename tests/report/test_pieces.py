@@ -173,3 +173,10 @@ def test_names_stay_whole_next_to_many_numbers() -> None:
     table = terminal.rendered([html.table(headings, rows, numbers=range(2, 8))])
     *_, names = rendered(table, 80).splitlines()
     assert names.split() == list(rows[0])
+
+
+def test_a_name_that_is_one_word_stays_whole_next_to_one_of_several() -> None:
+    headings = ("found", "element", "parameter", "value", "95 % interval")
+    row = ("spring to the ground", "load", "stiffness_nm_per_rad", "0.4676 Nm/rad", "0.3931 … 0.5422")
+    table = terminal.rendered([html.table(headings, [row], numbers=(3, 4))])
+    assert "stiffness_nm_per_rad" in rendered(table, 80)

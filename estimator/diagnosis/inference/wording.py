@@ -215,13 +215,13 @@ def off_the_sheet(off_nominal: Sequence[OffNominal]) -> str:
 
 
 def _left(verdict: Verdict, remainder: Remainder, element: Element | None, alone: Element | None) -> str:
-    noise = times(remainder.times_noise)
+    noise, without = times(remainder.times_noise), "" if remainder.element is None else " without the law below"
     if verdict is Verdict.PARTLY_EXPLAINED:
         share = f"{100.0 * remainder.share:.0f} %" if remainder.share >= 0.005 else "Less than 1 %"
         return (
-            f"{share} of the squared error is left, {noise} times the noise, and it is not noise: it {remainder.law}."
+            f"{share} of the squared error is left{without}, {noise} times the noise, and it is not noise: it "
+            f"{remainder.law}."
         )
     other = "" if alone in (None, element) else f"; an input by itself would most likely act {PLACES[alone]}"
     where = "" if element is None else f" Most likely it acts {PLACES[element]}{other}."
-    left = "What is left" if remainder.element is None else "What is left without the law that has no name"
-    return f"{left} is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"
+    return f"What is left{without} is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"
