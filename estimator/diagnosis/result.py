@@ -227,7 +227,7 @@ class Effort:
     @property
     def fitted(self) -> str:
         """Which effects a search without a find speaks of: the end of "no effect"."""
-        return "of the catalogue that was fitted" if self.untried else "of the catalogue"
+        return "that was fitted" if self.untried else "of the catalogue"
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,7 +67,7 @@ def test_an_unexplained_statement_says_which_effects_were_not_fitted_and_how_one
     fit = Fit("rad/s", 1.0, 0.9, 0.9, 0.9, 0.9, 0.05)
     left = Context(Remainder(1.0, 18.0, None, None, "has a line in its spectrum"))
     said = statement(Verdict.UNEXPLAINED, fit, (), Effort(untried=("gravity", "eddy_drag")), left)
-    assert "no effect of the catalogue that was fitted explains it" in said
+    assert "no effect that was fitted explains it" in said
     assert (
         f"Not all effects were fitted, and one of these may be the cause: {title_of('gravity')}, drag that levels off."
         in said
