@@ -60,9 +60,10 @@ class _Table:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         block, room = self.block, options.max_width
-        labels = [i for i, _ in enumerate(block.headings) if i not in block.numbers]
-        longest = {i: max(len(word) for cell in [" ", *self._cells(i)] for word in cell.split(" ")) for i in labels}
-        words = sum(longest.values()) + 2 * len(longest)
+        labels = [i for i, _ in enumerate(block.headings) if i not in block.numbers and any(self._cells(i))]
+        texts = {i: [block.headings[i], *self._cells(i)] for i in labels}
+        widths = {i: max(len(word) for text in texts[i] for word in text.split(" ")) for i in labels}
+        words = sum(widths.values()) + 2 * len(widths)
         folded = {i: block.headings[i].replace(" ", "\n") for i in block.numbers}
         whole, least = (
             sum(max(map(len, [*headings[i].split("\n"), *self._cells(i)])) + 2 for i in block.numbers)
@@ -70,22 +71,26 @@ class _Table:
         )
         is_room = whole + words <= room
         headings = [each if is_room else folded.get(i, each) for i, each in enumerate(block.headings)]
-        fewest = longest if least + words <= room else {}
-        yield _table(block, headings, fewest, is_whole=least + LEAST_LABELS <= room)
+        spare = room - words - (whole if is_room else least)
+        is_fixed = spare >= 0 and bool(block.numbers)  # of words alone the library divides the room better
+        for i in labels if is_fixed else ():
+            more = min(spare, max(map(len, texts[i])) - widths[i])
+            widths[i], spare = widths[i] + more, spare - more
+        yield _table(block, headings, widths if is_fixed else {}, is_whole=least + LEAST_LABELS <= room)
 
     def _cells(self, column: int) -> list[str]:
         return [str(row.cells[column]) for row in self.block.rows]
 
 
-def _table(block: html.HtmlTable, headings: Sequence[str], fewest: Mapping[int, int], is_whole: bool) -> Table:
-    """Make a table of the columns that hold text, some of them at least so wide."""
+def _table(block: html.HtmlTable, headings: Sequence[str], widths: Mapping[int, int], is_whole: bool) -> Table:
+    """Make a table of the columns that hold text, some of them of given widths."""
     columns = [i for i, _ in enumerate(headings) if any(str(row.cells[i]) for row in block.rows)]
     table = Table(box=None, pad_edge=False, show_header=any(headings))
     for i in columns:
         is_number = i in block.numbers
         justify: Literal["right", "left"] = "right" if is_number else "left"
         whole = is_number and is_whole
-        table.add_column(Text(headings[i]), justify=justify, overflow="fold", no_wrap=whole, min_width=fewest.get(i))
+        table.add_column(Text(headings[i]), justify=justify, overflow="fold", no_wrap=whole, width=widths.get(i))
     for row in block.rows:
         style = "dim" if row.kind == "undetermined" else ""
         table.add_row(*(Text(str(row.cells[i])) for i in columns), style=style)

@@ -177,6 +177,11 @@ def test_names_stay_whole_next_to_many_numbers() -> None:
 
 def test_a_name_that_is_one_word_stays_whole_next_to_one_of_several() -> None:
     headings = ("found", "element", "parameter", "value", "95 % interval")
-    row = ("spring to the ground", "load", "stiffness_nm_per_rad", "0.4676 Nm/rad", "0.3931 … 0.5422")
-    table = terminal.rendered([html.table(headings, [row], numbers=(3, 4))])
-    assert "stiffness_nm_per_rad" in rendered(table, 80)
+    rows = [
+        ("spring to the ground", "load", "stiffness_nm_per_rad", "0.4676 Nm/rad", "0.3931 … 0.5422"),
+        ("saturation of the torque", "torque path", "limit_m1_nm", "0.02345 Nm", "0.002562 … 0.06912"),
+    ]
+    table = terminal.rendered([html.table(headings, rows, numbers=(3, 4))])
+    shown = rendered(table, 80)
+    assert [cell for cell in ("stiffness_nm_per_rad", *rows[1][3:], rows[0][4]) if cell not in shown] == []
+    assert max(map(len, shown.splitlines())) <= 80
