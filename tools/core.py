@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 ROOM, START = "estimator.diagnosis", ("estimator.diagnosis.diagnose", "diagnose")
-WATCHED = ("search", "hypotheses", "answer")  # files of `inference` that are to be entered a few times each
+WATCHED = ("inference.search", "inference.hypotheses", "diagnose")  # files that are to be entered a few times each
 GATHERED = ("thresholds", "priors")  # files whose numbers are where they belong
 BOUNDING = frozenset({"min", "max", "clip", "minimum", "maximum"})
 PLAIN = (0, 1, 2, 0.5)  # numbers that are no choice
@@ -43,9 +43,7 @@ def core_figures(trees: Mapping[Path, ast.Module], lines: Mapping[Path, int]) ->
     return {
         "core: files from recording to verdict": f"{len(entered)}",
         "core: returns on that way": f"{entered.total() - len(entered)}",
-        f"core: times entered, {', '.join(WATCHED)}": ", ".join(
-            f"{entered[f'{ROOM}.inference.{name}']}" for name in WATCHED
-        ),
+        f"core: times entered, {', '.join(WATCHED)}": ", ".join(f"{entered[f'{ROOM}.{name}']}" for name in WATCHED),
         "core: lines of estimator/diagnosis and physics": f"{sum(lines[path] for path in rooms)}",
         "core: numbers that decide outside of the files for them": f"{numbers.total()} in {len(numbers)} files",
     }

@@ -10,8 +10,8 @@ from threadpoolctl import threadpool_limits
 from estimator.design.open import Candidate, Open, name_of, precision_of
 from estimator.design.paper import LEAST_PROBABILITY, TEMPERED
 from estimator.design.untested import with_untested
+from estimator.diagnosis.diagnose import SearchResult, answer
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
-from estimator.diagnosis.inference.answer import SearchResult, answer
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, Progress, silent
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis, Verdict
@@ -50,7 +50,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
     near = {
         each.effects: each
         for each in search.fits.ended.values()
-        if search.fits.is_plausible(each)
+        if each.is_plausible
         and each.score - best.score < within
         and not _holds(each.effects, best.effects)
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, covariance
+from estimator.diagnosis.inference.descent import covariance_of_innovations
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis
 from estimator.physics.model import DrivelineModel
 from estimator.signals.record import FloatArray, Record
 
@@ -82,7 +83,7 @@ def name_of(effects: Effects) -> str:
 def precision_of(hypothesis: Hypothesis) -> FloatArray:
     """Return what recordings say of a hypothesis' shared unknowns: their Fisher information, shape (S, S)."""
     count = len(hypothesis.result.problem.shared)
-    spread = covariance(hypothesis)[:count, :count]
+    spread = covariance_of_innovations(hypothesis)[:count, :count]
     free = np.diag(spread) > 0.0
     known = np.zeros((count, count))
     known[np.ix_(free, free)] = np.linalg.pinv(spread[np.ix_(free, free)], hermitian=True)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.design.open import Candidate, Open
-from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.covariance import Z95
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import GRADE
 from estimator.diagnosis.line.line import line_values

@@ -1,7 +1,4 @@
-"""A result put together from a fit: intervals, moments, profiles, load torques, and the model to continue with.
-
-The intervals hold although the errors are correlated.
-"""
+"""A result put together from a fit: effects and values with their intervals, and the model to continue with."""
 
 from __future__ import annotations
 
@@ -12,108 +9,27 @@ from functools import partial
 
 import numpy as np
 
-from estimator.diagnosis.acquisition.finding import AcquisitionFinding
-from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance as of_innovations
+from estimator.diagnosis.covariance import Z95, Estimate, reported_covariance
+from estimator.diagnosis.inference.descent import covariance_of_innovations
+from estimator.diagnosis.inference.figures import FreeRuns
+from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis
+from estimator.diagnosis.inference.trials import Standing
 from estimator.diagnosis.line.line import line_values
-from estimator.diagnosis.noise import residuals_by_record, unpredictable
-from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned
-from estimator.diagnosis.thresholds import Telling
+from estimator.diagnosis.result import Estimated, Evidence, FoundEffect, Interval, Profile, Retuned, Slight
+from estimator.diagnosis.thresholds import Noise
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
 from estimator.physics.effects.load import ROAD_GRADE, grade_basis
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, fit, warm_start
 from estimator.physics.jacobian import STEP
 from estimator.physics.layout import LOAD, slot
 from estimator.physics.model import DrivelineModel, EffectValue, Parameter, parameter_dimension, parameter_unit, unit
-from estimator.physics.problem import local_part
+from estimator.physics.problem import local_part, make_problem
 from estimator.physics.steps import inside, moments_of
 from estimator.physics.unknowns import LOAD_TORQUE, Shared
-from estimator.signals.correlation import correlation_length, effective_samples
-from estimator.signals.record import BoolArray, FloatArray
+from estimator.signals.record import FloatArray
 
-Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 PROFILE_POINTS_S = 1.0  # a profile is reported every second
-
-
-def covariance(result: FitResult) -> FloatArray:
-    """Return the covariance of the scaled unknowns, shape (U, U), by the sandwich formula.
-
-    ``C = B M B`` with ``B = (J'J)^-1`` and ``M`` the long-run covariance of the scores ``J_k e_k``, Bartlett
-    weights over several correlation lengths of the error (Newey and West, Econometrica 55, 1987). An effect's
-    parameter at a bound of its law is held there and has no variance. A nominal parameter at the edge of its tolerance
-    is not: the tolerance is a belief about it, and how well the data determine it does not change there.
-    """
-    return _sandwich(result, free_unknowns(result))
-
-
-def _sandwich(result: FitResult, free: BoolArray) -> FloatArray:
-    j = result.jacobian[:, free]
-    bread = _bread(j)
-    full = np.zeros((result.x.size, result.x.size))
-    full[np.ix_(free, free)] = bread @ _meat(result, j) @ bread
-    return full
-
-
-def reported_covariance(result: FitResult) -> FloatArray:
-    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise.
-
-    The part of the error that its own past predicts is physics written another way, or the torque reading's own
-    noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
-    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``. A parameter that ended at a bound of
-    its law has the variance that it would have without the bound, by itself: its interval goes one way, from the bound.
-    """
-    free, coherent = free_unknowns(result), coherent_variance(result)
-
-    def reported(free: BoolArray) -> FloatArray:
-        full = _sandwich(result, free)
-        full[np.ix_(free, free)] += coherent * _bread(result.jacobian[:, free])
-        return full
-
-    full, each = reported(free), np.arange(result.x.size)
-    for i in (i for i, shared in enumerate(result.problem.shared) if not free[i] and shared.low < shared.high):
-        full[i, i] = reported(free | (each == i))[i, i]
-    return full
-
-
-def coherent_variance(result: FitResult) -> float:
-    """Return the mean square of the error that is no noise, times the samples for which it keeps its value."""
-    coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
-    return coherent * Telling.COHERENT_S / min(record.sample_time_s for record in result.problem.records)
-
-
-def free_unknowns(result: FitResult) -> BoolArray:
-    """Return which unknowns have a variance, shape (U,): all but parameters of effects at a bound of their law."""
-    held = result.pinned
-    of_effects = np.array([bool(shared.effect) for shared in result.problem.shared], dtype=np.bool_)
-    held[: of_effects.size] &= of_effects
-    return ~held
-
-
-def _bread(jacobian: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
-
-
-def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:
-    errors = residuals_by_record(result)
-    shortest = min(error.size for error in errors)
-    lags = int(min(4.0 * correlation_length(errors), shortest / 4))
-    total = np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    first = 0
-    for error in errors:
-        scores = jacobian[first : first + error.size] * error[:, None]
-        first += error.size
-        total += _long_run(scores, lags)
-    n = result.residual.size
-    return total * n / max(n - jacobian.shape[1], 1)
-
-
-def _long_run(scores: FloatArray, lags: int) -> FloatArray:
-    """Sum the Bartlett-weighted cross products of the scores up to a distance of ``lags``, by block differences."""
-    window = max(lags, 1)
-    padded = np.vstack([np.zeros((window, scores.shape[1])), scores, np.zeros((window - 1, scores.shape[1]))])
-    sums = np.cumsum(padded, axis=0)
-    blocks = sums[window:] - sums[:-window]
-    return blocks.T @ blocks / window
 
 
 def interval(result: FitResult, cov: FloatArray, index: int) -> tuple[float, float]:
@@ -197,44 +113,37 @@ def moments_in(name: str, result: FitResult) -> dict[str, tuple[Interval, ...]]:
     return found
 
 
-def acquired_effects(
-    findings: Sequence[AcquisitionFinding], before: Sequence[FloatArray], after: Sequence[FloatArray]
-) -> tuple[FoundEffect, ...]:
-    """Return what was recognised of the acquisition as effects."""
-    seen = [slice(int(0.7 * error.size), None) for error in after]
-    held = [rms_of([e[rows] for e, rows in zip(errors, seen, strict=True)]) for errors in (before, after)]
-    return tuple(
-        FoundEffect(
-            name=finding.name,
-            element=EFFECTS[finding.name].element,
-            statement=finding.statement,
-            parameters={name: Estimated(*sized) for name, sized in finding.parameters.items()},
-            time_s={},
-            indistinguishable_from=(),
-            evidence=Evidence(bic_gained(before, after), held[0], held[1], finding.p_value),
-        )
-        for finding in findings
+def found_effect(standing: Standing, runs: FreeRuns, estimate: Estimate) -> FoundEffect:
+    """Return an effect of the believed set with its values, from the fit that is reported."""
+    entry, model, best = EFFECTS[standing.name], runs.unseen.line, runs.believed.result
+    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
+    profiles = {}
+    if standing.name == GRADE:
+        of = best.problem
+        problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
+        course = fit(problem, warm_start(problem, best))
+        of_course = reported_covariance(course)
+        profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
+    else:
+        parameters = parameters_of(standing.name, estimate.fit, estimate.covariance, model)
+    p_value = max(math.exp(-0.5 * max(standing.evidence, 0.0)), Noise.SMALLEST_P)
+    return FoundEffect(
+        name=entry.name,
+        element=entry.element,
+        statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
+        parameters=parameters,
+        time_s=moments_in(standing.name, estimate.fit) if entry.event else {},
+        indistinguishable_from=tuple(standing.alike),
+        alternatives=standing.alike,
+        evidence=Evidence(standing.evidence, runs.held_before, runs.held_after, p_value),
+        profiles=profiles,
+        share=standing.share,
+        probability=standing.necessity.counted.probability,
+        form=entry.form({name: p.value for name, p in parameters.items()}),
+        necessity=standing.necessity.value,
+        least_necessity=standing.necessity.least,
+        counted=standing.necessity.counted,
     )
-
-
-def bic_gained(before: Sequence[FloatArray], after: Sequence[FloatArray]) -> float:
-    """Return by how much one more unknown betters the information criterion of errors, for those of all recordings.
-
-    ``n_e ln(S_0/S_1) - ln n_e`` with the effective number of samples n_e of the errors ``after`` (Schwarz, Ann. Stat.
-    6, 1978).
-    """
-    n = max(effective_samples(after), 3.0)
-    ratio = _squares(before) / max(_squares(after), np.finfo(float).tiny)
-    return n * math.log(max(ratio, 1.0)) - math.log(n)
-
-
-def _squares(errors: Sequence[FloatArray]) -> float:
-    return float(sum(error @ error for error in errors))
-
-
-def rms_of(errors: Sequence[FloatArray]) -> float:
-    """Return the RMS of the errors of several recordings together."""
-    return float(np.sqrt(_squares(errors) / sum(error.size for error in errors)))
 
 
 def parameters_of(name: str, result: FitResult, cov: FloatArray, model: DrivelineModel) -> dict[str, Estimated]:
@@ -310,7 +219,7 @@ def moved_values(of: Hypothesis, other: FitResult) -> dict[str, float]:
 
     Of those that are outside of their 95 % intervals there.
     """
-    spread, result = np.sqrt(np.diag(of_innovations(of))), of.result
+    spread, result = np.sqrt(np.diag(covariance_of_innovations(of))), of.result
     there = {(each.effect, each.name): i for i, each in enumerate(other.problem.shared)}
     moved = {}
     for i, each in enumerate(result.problem.shared):
@@ -393,3 +302,9 @@ def _retuned_effects(result: FitResult, model: DrivelineModel) -> dict[str, Mapp
         name: {key: v.at(result.values_of(name).get(key, v.value)) for key, v in values.items()}
         for name, values in model.effects.items()
     }
+
+
+def slight(trace: Standing, believed: Hypothesis, without: FitResult) -> Slight:
+    """Return a trace of a believed set; in the fit without it some values are others, though the error hardly is."""
+    values = believed.result.values_of(trace.name)
+    return Slight(trace.name, trace.share, values, moved_values(believed, without), trace.slight)

@@ -25,9 +25,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from estimator.diagnosis.flange import FREE, slots_of, with_only
+from estimator.diagnosis.thresholds import StandIns
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.driveline import Case, InitialCondition
-from estimator.physics.effect import Effect, Element
+from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit, make_problem
 from estimator.physics.inputs import load_of
 from estimator.physics.kernel import state_vector
@@ -59,14 +60,6 @@ _WITHIN = [
 ]
 """What acts within a sample."""
 
-SEARCH_FACTOR = 30.0  # factor, either way, within which values are looked for
-SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
-FREQUENCIES = 5  # natural frequencies at which one starts, up to `HIGHEST_HZ` or a quarter of the sampling rate
-
-LOWEST_HZ, HIGHEST_HZ = 1.0, 60.0
-DAMPING = 0.05
-
-BETTER = 0.7  # share of a rigid line's error that one with a shaft leaves at most to be taken
 ITERATIONS = 12  # of the fit from each start; the best goes to its end
 
 
@@ -84,13 +77,6 @@ class PlantSetting:
 
 Simulated = Callable[[Record, PlantSetting], FloatArray]
 """Recording, and what it is simulated with, to the true output (N,)."""
-
-
-def acts_around(entry: Effect, plant: object) -> bool:
-    """Tell whether an effect acts at the inputs, shafts or outputs of a plant, whatever is inside it."""
-    if isinstance(plant, BlackBox) and entry.name in plant.laws:
-        return True
-    return entry.profile or entry.element in (Element.TORQUE_PATH, Element.SPEED_SENSOR, Element.ACQUISITION)
 
 
 def _slots(elements: Collection[Element]) -> list[int]:
@@ -243,15 +229,15 @@ def equivalent_line(records: Sequence[Record]) -> DrivelineModel:
     """Return a line with one inertia or two, trusted exactly, that answers as the outputs of some recordings."""
     inertia, viscous = _rigid(records)
     one = _fitted(Structure.ONE_MASS, {"J_M": inertia, "b_M": viscous}, records)
-    highest = min(HIGHEST_HZ, 0.25 / records[0].sample_time_s)
+    highest = min(StandIns.HIGHEST_HZ, StandIns.OF_RATE / records[0].sample_time_s)
     starts = [
         _two_masses(inertia, viscous, share, hz)
-        for share in SHARES
-        for hz in np.geomspace(LOWEST_HZ, highest, FREQUENCIES).tolist()
+        for share in StandIns.SHARES
+        for hz in np.geomspace(StandIns.LOWEST_HZ, highest, StandIns.FREQUENCIES).tolist()
     ]
     near = min((_fitted(Structure.TWO_MASS, start, records) for start in starts), key=lambda result: result.rms)
     two = fit(near.problem, near.x)
-    structure, best = (Structure.TWO_MASS, two) if two.rms < BETTER * one.rms else (Structure.ONE_MASS, one)
+    structure, best = (Structure.TWO_MASS, two) if two.rms < StandIns.BETTER * one.rms else (Structure.ONE_MASS, one)
     values = best.values_of("")
     return DrivelineModel(structure, {name: Parameter(values[name], 0.0) for name in structure.parameter_names})
 
@@ -268,7 +254,7 @@ def _rigid(records: Sequence[Record]) -> tuple[float, float]:
         moved.append(speed[1:] - speed[0])
     found = np.linalg.lstsq(np.concatenate(columns), np.concatenate(moved), rcond=None)[0]
     inertia = 1.0 / max(abs(float(found[0])), np.finfo(float).tiny)
-    return inertia, max(float(found[1]) * inertia, 1e-3 * inertia)
+    return inertia, max(float(found[1]) * inertia, StandIns.LEAST_VISCOUS * inertia)
 
 
 def _two_masses(inertia: float, viscous: float, share: float, hz: float) -> dict[str, float]:
@@ -279,7 +265,7 @@ def _two_masses(inertia: float, viscous: float, share: float, hz: float) -> dict
         "J_M": motor,
         "J_L": load,
         "k": reduced * turn**2,
-        "c": 2.0 * DAMPING * reduced * turn,
+        "c": 2.0 * StandIns.DAMPING * reduced * turn,
         "b_M": half,
         "b_L": half,
     }
@@ -288,6 +274,7 @@ def _two_masses(inertia: float, viscous: float, share: float, hz: float) -> dict
 def _fitted(structure: Structure, start: Mapping[str, float], records: Sequence[Record]) -> FitResult:
     model = DrivelineModel(structure, {name: Parameter(start[name], 0.0) for name in structure.parameter_names})
     shared = [
-        Shared("", name, start[name], 1.0 / SEARCH_FACTOR, SEARCH_FACTOR, 1.0) for name in structure.parameter_names
+        Shared("", name, start[name], 1.0 / StandIns.SEARCH_FACTOR, StandIns.SEARCH_FACTOR, 1.0)
+        for name in structure.parameter_names
     ]
     return fit(make_problem(model, records, shared), iterations=ITERATIONS)

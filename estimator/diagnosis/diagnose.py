@@ -1,24 +1,45 @@
-"""``diagnose``: recordings and a nominal model in, a verdict out."""
+"""``diagnose``: recordings and a nominal model in, a verdict out.
+
+prepare (`prepare`, and in it `doubtful`: is it plausible?), acquire (`with_faults_compensated`), search (`searched`),
+decide (`decide`), say (`said`): each stage makes one record from those before it, and nothing goes back.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from threadpoolctl import threadpool_limits
 
+from estimator.diagnosis.acquisition.chain import Chain, with_faults_compensated, without_acquisition_effects
 from estimator.diagnosis.first_use import compiled
-from estimator.diagnosis.inference.answer import answer
+from estimator.diagnosis.inference.decide import Decision, decide
+from estimator.diagnosis.inference.figures import Unseen
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Progress, silent
-from estimator.diagnosis.preconditions.prepare import prepare
+from estimator.diagnosis.inference.search import Search, searched
+from estimator.diagnosis.preconditions.prepare import Prepared, prepare
 from estimator.diagnosis.result import Diagnosis
+from estimator.diagnosis.say import Basis, effort_of, said, undecided, warnings_of
+from estimator.diagnosis.tables import free_form, unnamed_law
 from estimator.diagnosis.thresholds import Telling
 from estimator.physics.model import DrivelineModel
-from estimator.physics.parallel import Work
+from estimator.physics.parallel import TimeIsUp, Work, counted
 from estimator.signals.record import Record
 
 BUDGET_S = math.inf
 """Time after which a diagnosis is ended undecided [s]: none, so that the answer depends on no machine."""
+
+
+@dataclass(frozen=True, slots=True)
+class SearchResult:
+    """What a search found, the recordings as they were read for it, and what was decided."""
+
+    chain: Chain  # recordings, and the faults of their acquisition
+    search: Search  # the way to the best set
+    decision: Decision  # what is believed of it
 
 
 def diagnose(
@@ -64,12 +85,44 @@ def diagnose(
     Implausible
         Where torque, output or time is off by a factor or in sign.
     """
-    progress = compiled(model, records, _rising(progress))
+    progress = _rising(progress)
+    progress = compiled(model, records, progress)
     with threadpool_limits(1, user_api="blas"):  # on tall, thin matrices more threads only wait for each other
         progress("checking the recordings", 0.0)
         work = Work(BUDGET_S if budget_s is None else budget_s, Telling.TO_SEARCH)
         ready = prepare(records, model, holdout)
         return ready.finished(answer(ready, model, progress, effort, work))
+
+
+def answer(
+    ready: Prepared,
+    model: DrivelineModel,
+    progress: Progress,
+    level: str,
+    work: Work,
+    keep: Callable[[SearchResult], None] = lambda _found: None,
+) -> Diagnosis:
+    """Return the diagnosis of recordings that are fit for one; undecided where the limit of time ends it.
+
+    ``keep`` is given what was found and decided, for those who continue with it.
+    """
+    began = time.perf_counter()
+    line, chain = without_acquisition_effects(model), with_faults_compensated(ready.records)
+    started: list[Fits] = []
+    with counted(work):
+        try:
+            read, search = searched(chain, line, work, Telling.LEVELS[level], started.append, progress)
+            progress("weighing what was found", 0.8)
+            decision = decide(search, read, Unseen(line, with_faults_compensated(ready.holdout)), free_form)
+            keep(SearchResult(read, search, decision))
+            progress("simulating what was found", 0.9)
+            effort, warnings = effort_of(search, level, decision), warnings_of(search, level)
+            law = unnamed_law(decision)
+            diagnosis = said(Basis(decision, search, model, effort, warnings, law, ready.doubts))
+        except TimeIsUp:
+            diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level, ready.doubts)
+    progress("done", 1.0)
+    return replace(diagnosis, timing_s={"total": time.perf_counter() - began})
 
 
 def _rising(progress: Progress) -> Progress:

@@ -1,4 +1,4 @@
-"""Noise of a reading, and what errors say against it."""
+"""Noise of a reading, from the data alone: no model and no law is in it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 
 from estimator.diagnosis.thresholds import Noise
 from estimator.errors import NotExciting
-from estimator.physics.fit import FitResult
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 
@@ -49,18 +48,3 @@ def _one_step_errors(record: Record, usable: BoolArray) -> FloatArray:
     regressors = np.column_stack([*columns, np.ones(y.size - n)])
     a, b = regressors[usable], y[n:][usable]
     return b - a @ np.linalg.lstsq(a, b, rcond=None)[0]
-
-
-def unpredictable(errors: Sequence[FloatArray]) -> float:
-    """Return the RMS of what a set of simulation errors' own past does not predict."""
-    n = Noise.PREDICTOR_ORDER
-    past = np.concatenate([np.lib.stride_tricks.sliding_window_view(error[:-1], n) for error in errors])
-    now = np.concatenate([error[n:] for error in errors])
-    left = now - past @ np.linalg.lstsq(past, now, rcond=None)[0]
-    return float(np.sqrt(left @ left / max(left.size - n, 1)))
-
-
-def residuals_by_record(result: FitResult) -> list[FloatArray]:
-    """Split a fit's residual into those of its recordings, of the samples that count."""
-    sizes = np.cumsum([int(use.sum()) for use in result.problem.use])[:-1]
-    return list(np.split(result.residual, sizes))

@@ -1,26 +1,33 @@
-"""A curve that is fitted: its knots, laid by where the line was, its unknowns, and the shapes it is begun from."""
+"""A curve that is fitted in the free run: its knots, its unknowns, where it is begun from, and how it is fitted.
+
+A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays near
+it where the law is strongly nonlinear, as a gap or a freewheel is: so each place is begun from several shapes, under an
+observer whose gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no
+simulation runs away.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from estimator.diagnosis.thresholds import Curves
+from estimator.least_squares import minimise
 from estimator.physics.curve import curve_over
+from estimator.physics.driveline import Structure
 from estimator.physics.fit import FitResult
+from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import OBSERVER, flat_values, slot
 from estimator.physics.motion import torque_scale
-from estimator.physics.problem import Problem, case_of
+from estimator.physics.problem import Problem, bounds, case_of, outputs_at, residual_at
 from estimator.physics.table_signals import signal_of
 from estimator.physics.tables import COUNT, DAMPING, PREFIX, Table
 from estimator.physics.unknowns import Shared
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray
-
-REACH = 1.5  # knots reach to so many times what the re-tuned model reaches
-FRACTIONS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that, where they stand on both sides of zero
-EVEN_KNOTS = 7  # knots of a signal of one sign, equally far apart
-FEWEST_SAMPLES = 40  # samples between two knots at least
 
 STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_speed": "b_L"}
 """Parameter of the line that a straight curve at a place does the same as: intervals are those of both together."""
@@ -29,6 +36,26 @@ YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 """A torque over the twist that yields, as a clutch slips: a straight curve and the slider of this effect."""
 
 LEVEL, SUDDEN = 0.7, 10.0  # where its level starts, in the torque in use, and its knee
+
+SEARCHED = {
+    Structure.ONE_MASS: ("torque", "motor_speed"),
+    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
+    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
+    Structure.JOINT: ("shaft_twist", "shaft_rate"),
+}
+"""Places at which a curve is looked for."""
+
+Z95 = 1.96  # half of a 95 % interval, in standard deviations
+
+GAINS = (0.3, 0.1, 0.03, 0.01, 0.0)
+"""Gains of the observer, one after the other."""
+
+SCOUTS, SCOUT_STEPS, STEPS, LAST_STEPS = 2, 3, 4, 10
+"""Gains after which only the best shapes and places continue; Jacobians at each gain there, behind, and at the end."""
+
+SMOOTHNESS = (1.0, 0.05)
+"""Weights of the curve's bending that are tried: what its slope changes by from one piece to the next, squared, counts
+as so many thousandths of the squared error before."""
 
 Masks = tuple[BoolArray, ...]
 """Which samples count, per recording."""
@@ -140,15 +167,15 @@ def _knots(signal: FloatArray, low: float, high: float) -> FloatArray | None:
     """Return the knots for a signal in use between two values: around zero, or evenly; none between too few samples."""
     if not high - low > 1e-9 * max(abs(low), abs(high), 1e-300):
         return None
-    if low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high):
-        top = REACH * max(-low, high)
-        knots = np.concatenate([-top * np.array(FRACTIONS)[::-1], [0.0], top * np.array(FRACTIONS)])
+    if low < 0.0 < high and min(-low, high) > Curves.TWO_SIDED * max(-low, high):
+        top = Curves.REACH * max(-low, high)
+        knots = np.concatenate([-top * np.array(Curves.FRACTIONS)[::-1], [0.0], top * np.array(Curves.FRACTIONS)])
     else:
-        knots = np.linspace(low, high, EVEN_KNOTS)
+        knots = np.linspace(low, high, Curves.EVEN_KNOTS)
     kept = [0]
     for i in range(1, knots.size):
         between = np.count_nonzero((signal >= knots[kept[-1]]) & (signal < knots[i]))
-        if between >= FEWEST_SAMPLES or knots[i] == 0.0 or i == knots.size - 1:
+        if between >= Curves.FEWEST_SAMPLES or knots[i] == 0.0 or i == knots.size - 1:
             kept.append(i)
     found = knots[kept]
     return found if found.size > 2 else None
@@ -158,7 +185,7 @@ def _outward(anchor: float, knots: FloatArray, signal: FloatArray) -> list[float
     """Return rising knots above an anchor, samples enough between each two; the last one stays before all others."""
     kept = [anchor]
     for knot in knots[knots > anchor]:
-        if np.count_nonzero((signal >= kept[-1]) & (signal < knot)) >= FEWEST_SAMPLES:
+        if np.count_nonzero((signal >= kept[-1]) & (signal < knot)) >= Curves.FEWEST_SAMPLES:
             kept.append(float(knot))
         elif knot == knots[-1] and len(kept) > 1:
             kept[-1] = float(knot)
@@ -192,12 +219,192 @@ def shapes(curve: Curve) -> dict[str, FloatArray]:
     straight = {"straight": curve.own * one}
     if curve.place in ("shaft_twist", "torque"):
         return straight | {
-            "gap": np.where(np.abs(at) < 0.13, 0.02, 1.0),
+            "gap": np.where(np.abs(at) < Curves.GAP, 0.02, 1.0),
             "one-sided": np.where(at > 0.0, 1.0, 0.02),
             "one-sided, backwards": np.where(at < 0.0, 1.0, 0.02),
-            "limited": np.where(np.abs(at) < 0.2, 1.0, 0.05),
+            "limited": np.where(np.abs(at) < Curves.LIMIT, 1.0, 0.05),
             "hardening": 0.7 + 0.5 * (3.0 * at) ** 2,
         }
     if curve.knots[0] < 0.0 < curve.knots[-1]:
-        return straight | {"step": np.where(np.abs(at) < 0.1, 0.5, 0.0), "one-sided": np.where(at > 0.0, 0.1, 0.0)}
+        step = np.where(np.abs(at) < Curves.STEP, 0.5, 0.0)
+        return straight | {"step": step, "one-sided": np.where(at > 0.0, 0.1, 0.0)}
     return straight
+
+
+class Descent:
+    """The fit of one curve: unknowns are those of the line, the curve's slopes and damping, and the recordings' own."""
+
+    def __init__(self, curve: Curve, result: FitResult, use: Masks) -> None:
+        self.curve, self.problem = curve, curve.released(result, use)
+        self.first = len(result.problem.shared)
+        self.after = self.first + curve.pieces
+        self._x0 = result.x
+        self._scale = np.sqrt(max(result.squares, 1e-300) / 1000.0)
+        low, high = bounds(self.problem)
+        low[self.first : self.after], high[self.first : self.after] = curve.most
+        self.low, self.high = low, high
+
+    def start(self, slopes: FloatArray) -> FloatArray:
+        """Return unknowns with these slopes, all else as the line had it."""
+        own = [each.start for each in self.curve.more]
+        return np.concatenate([self._x0[: self.first], slopes, own, self._x0[self.first :]])
+
+    def x(self, z: FloatArray) -> FloatArray:
+        """Return the scaled unknowns of the problem: values in the place of slopes."""
+        x = z.copy()
+        slopes = z[self.first : self.after] - self.curve.own
+        x[self.first : self.after] = self.curve.values_of_slopes @ slopes
+        return x
+
+    def at(self, gain: float) -> Problem:
+        """Return the problem simulated as an observer of the readings at a gain; at 0 it is a free run."""
+        p = self.problem.p.copy()
+        p[slot("", OBSERVER)] = gain
+        return replace(self.problem, p=p)
+
+    def fitted(self, z: FloatArray, gain: float, smooth: float, steps: int) -> tuple[FloatArray, float]:
+        """Return unknowns after some steps at a gain, and the squared error there."""
+        problem, seen = self.at(gain), dict[bytes, tuple[FloatArray, ...]]()
+        of_curve = slice(self.first, self.after)
+        each = np.eye(self.curve.pieces)
+        penalty = np.sqrt(smooth) * np.vstack([np.diff(each, axis=0), 1e-2 * each])
+        rows = np.zeros((penalty.shape[0], z.size))
+        rows[:, of_curve] = penalty
+
+        def outputs(z: FloatArray) -> tuple[FloatArray, ...]:
+            key = z.tobytes()
+            if key not in seen:
+                seen.clear()
+                seen[key] = outputs_at(problem, self.x(z))
+            return seen[key]
+
+        def residual(z: FloatArray) -> FloatArray:
+            bent = penalty @ (z[of_curve] - self.curve.own)  # other unknowns may be infinite, as a limit of none is
+            return np.concatenate([residual_at(problem, outputs(z)) / self._scale, bent])
+
+        def jacobian(z: FloatArray) -> FloatArray:
+            found = jacobian_at(problem, self.x(z), outputs(z))
+            found[:, of_curve] = found[:, of_curve] @ self.curve.values_of_slopes
+            return np.vstack([found / self._scale, rows])
+
+        solution = minimise(residual, jacobian, z, self.low, self.high, steps)
+        size = rows.shape[0]
+        return solution.x, float(np.sum((self._scale * solution.residual[:-size]) ** 2))
+
+    def error(self, z: FloatArray, masks: Masks) -> float:
+        """Return the RMS of the free-run error over some samples."""
+        return rms_over(self.at(0.0), outputs_at(self.at(0.0), self.x(z)), masks)
+
+
+def rms_over(problem: Problem, outputs: Sequence[FloatArray], masks: Masks) -> float:
+    """Return the RMS of the errors of first outputs over some samples, without those of a lead [unit of the output]."""
+    rows = zip(problem.records, outputs, masks, strict=True)
+    errors = [(out - record.output)[mask] for record, out, mask in rows if record.lead is None]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """The best curve of a place, fitted to the samples that fit."""
+
+    descent: Descent  # for this place
+    z: FloatArray  # unknowns, scaled
+    smooth: float  # weight of the curve's second differences
+    chosen_by: float  # RMS over the samples that choose
+
+    def refitted(self, result: FitResult, use: Masks) -> Candidate:
+        """Return the same curve fitted to other samples, from where it is."""
+        descent = Descent(self.descent.curve, replace(result, x=result.x), use)
+        z, _ = descent.fitted(self.z, 0.0, self.smooth, LAST_STEPS)
+        return replace(self, descent=descent, z=z)
+
+    def drawn_in(self, result: FitResult, use: Masks) -> Candidate:
+        """Draw the knots in to where the simulation with the curve was; fitted once more where that changes it."""
+        old, slopes = self.descent, slice(self.descent.first, self.descent.after)
+        curve = old.curve.drawn_in(signal_over(old.curve.place, with_curve(self), 0.0))
+        between = old.curve.slopes_between(curve.knots, self.z[slopes])
+        descent = Descent(curve, result, use)
+        z = np.concatenate([self.z[: slopes.start], between, self.z[slopes.stop :]])
+        if not curve.yields:  # a straight one is the same through any knots
+            z, _ = descent.fitted(z, 0.0, self.smooth, LAST_STEPS)
+        return replace(self, descent=descent, z=z)
+
+
+Scouted = tuple[Descent, list[tuple[float, FloatArray]]]
+"""A place after the first gains: squared error and unknowns that its shapes leave there, the best of them first."""
+
+
+def scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
+    """Begin the fit of a curve from each of its shapes."""
+    descent, left = Descent(curve, retuned, fitting), []
+    for slopes in shapes(curve).values():
+        z, squares = descent.start(slopes), np.inf
+        for gain in GAINS[:SCOUTS]:
+            z, squares = descent.fitted(z, gain, SMOOTHNESS[0], SCOUT_STEPS)
+        left.append((squares, z))
+    return descent, sorted(left, key=lambda each: each[0])
+
+
+def best_curve(begun: Scouted, choosing: Masks) -> Candidate:
+    """Let the observer's gain down from the best shapes, and return what the choosing samples prefer."""
+    (descent, left), found = begun, list[Candidate]()
+    for _, z in left[: Curves.CONTINUED]:
+        for gain in GAINS[SCOUTS:]:
+            z, _ = descent.fitted(z, gain, SMOOTHNESS[0], STEPS)
+        found.append(Candidate(descent, z, SMOOTHNESS[0], descent.error(z, choosing)))
+    best = min(found, key=lambda each: each.chosen_by)
+    for smooth in SMOOTHNESS[1:]:
+        z, _ = descent.fitted(best.z, 0.0, smooth, STEPS)
+        best = min(best, Candidate(descent, z, smooth, descent.error(z, choosing)), key=lambda each: each.chosen_by)
+    return best
+
+
+def curve_through(result: FitResult, place: str) -> Candidate | None:
+    """Return the free form of a law at a place, fitted to all samples that count; None where the line hardly moved."""
+    curve = None if place not in SEARCHED[result.problem.grid.structure] else curve_at(place, result, GAINS[0])
+    if curve is None:
+        return None
+    begun = scouted(curve, result, result.problem.use)
+    return best_curve(begun, result.problem.use)
+
+
+def with_curve(found: Candidate) -> FitResult:
+    """Return the fit with the curve among what is given: a free run."""
+    descent = found.descent
+    problem, x = descent.at(0.0), descent.x(found.z)
+    outputs = outputs_at(problem, x)
+    added = range(descent.first, descent.after + len(descent.curve.more))
+    p = problem.p.copy()
+    for i in added:
+        p[problem.shared[i].slot] = problem.shared[i].scale * x[i]
+    given = replace(problem, p=p, shared=problem.shared[: descent.first])
+    return FitResult(given, np.delete(x, added), outputs, residual_at(problem, outputs), None, False)
+
+
+def reported(found: Candidate) -> tuple[FitResult, Table]:
+    """Return the fit with the curve among what is given, and the curve with its intervals."""
+    descent, fit = found.descent, with_curve(found)
+    problem, x, curve = descent.at(0.0), descent.x(found.z), descent.curve
+    values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
+    half = np.insert(_half_widths(descent, problem, x, fit.outputs, fit.residual), curve.zero, 0.0)
+    bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
+    damping = float(fit.problem.p[slot(curve.name, DAMPING)]) if curve.more else 0.0
+    return fit, Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
+
+
+def _half_widths(
+    descent: Descent, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], residual: FloatArray
+) -> FloatArray:
+    """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
+    derivative = jacobian_at(problem, x, outputs)
+    for i, each in enumerate(problem.shared):
+        if not each.effect and each.name == STRAIGHT.get(descent.curve.place):  # a recording tells their sum
+            derivative[:, i] = 0.0
+    free = np.flatnonzero(derivative.any(axis=0))
+    j = derivative[:, free]
+    variance = float(residual @ residual) / effective_samples([residual])
+    scale = np.sqrt(np.maximum(np.diag(j.T @ j), 1e-300))
+    inverse = np.linalg.pinv((j / scale).T @ (j / scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
+    spread = np.zeros(x.size)
+    spread[free] = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance)
+    return Z95 * spread[descent.first : descent.after]

@@ -8,23 +8,13 @@ from itertools import combinations
 
 import numpy as np
 
+from estimator.diagnosis.thresholds import Curves
 from estimator.physics.laws import beyond_gap
 from estimator.physics.tables import Table
 from estimator.signals.record import FloatArray
 
-WITHIN = 0.02
-"""How far off its values a curve may be described, as a share of the torque it spans, where its band is narrower."""
-
-WIDEST = 0.1  # the same where the band is wider: any law lies within one that is as wide as the curve
-
 SIZES = np.linspace(0.01, 0.9, 90)
 """Halves of a dead band that are tried, as shares of the knots' reach."""
-
-RETUNED = 0.2
-"""How far the slope behind a dead band may be from the line's own: a steeper one would make the band wider."""
-
-AT_LIMIT, FEWEST_AT_LIMIT = 0.95, 3
-"""Share of the largest torque from which a knot is at a limit, and how many knots have to be."""
 
 Function = Callable[[FloatArray], FloatArray]
 
@@ -52,7 +42,7 @@ def _total(table: Table, slope: float) -> tuple[FloatArray, FloatArray, FloatArr
     if table.ci95 is not None:
         half = 0.5 * np.array([high - low for low, high in table.ci95])
     span = float(np.ptp(total)) or float(np.ptp(values)) or 1.0  # a curve may take away all that the line has
-    return x, total, np.clip(half, WITHIN * span, WIDEST * span)
+    return x, total, np.clip(half, Curves.WITHIN * span, Curves.WIDEST * span)
 
 
 def shortest_formula(table: Table, slope: float) -> str:
@@ -95,13 +85,14 @@ def looks_like(table: Table, slope: float) -> str:
     ]
     for half in (SIZES * reach).tolist():
         shapes.append((f"a dead band of {2.0 * half:.3g} {unit}", _beyond(2.0 * half)))
-    if np.count_nonzero(np.abs(total) > AT_LIMIT * top) >= FEWEST_AT_LIMIT:
+    if np.count_nonzero(np.abs(total) > Curves.AT_LIMIT * top) >= Curves.FEWEST_AT_LIMIT:
         shapes.append((f"a limit of {top:.3g} Nm", _limited(top, total, x)))
     found = []
     for name, shape in shapes:
         column = shape(x) / room
         factor = float(column @ (total / room)) / max(float(column @ column), 1e-300)
-        factor = 1.0 if "limit" in name else min(max(factor, (1.0 - RETUNED) * slope), (1.0 + RETUNED) * slope)
+        low, high = ((1.0 + sign * Curves.RETUNED) * slope for sign in (-1.0, 1.0))
+        factor = 1.0 if "limit" in name else min(max(factor, low), high)
         found.append((name, factor * column * room))
     return _nearest(found, total, room)
 
@@ -117,7 +108,7 @@ def _beyond(gap: float) -> Function:
 
 
 def _limited(limit: float, total: FloatArray, x: FloatArray) -> Function:
-    near = np.abs(total) < AT_LIMIT * limit
+    near = np.abs(total) < Curves.AT_LIMIT * limit
     steep = float(x[near] @ total[near]) / max(float(x[near] @ x[near]), 1e-300)
     return lambda x: np.clip(steep * x, -limit, limit)
 

@@ -1,12 +1,13 @@
-"""Laws without a name as tables: at each place the curve with which the free run fits best, if any is better.
+"""Laws without a name: a curve through knots, as the rival of a second name and next to what is decided.
 
-A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays near
-it where the law is strongly nonlinear, as a gap or a freewheel is: so each place is begun from several shapes, under an
-observer whose gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no
-simulation runs away.
+Nature's laws are written in other forms than the model's. What the form leaves is taken by a second law at the same
+element, at thousands of units of likelihood. So each second name there has a rival (`free_form`): the set without it,
+and a curve in the variable of the law that is there already.
 
-The samples of each recording are cut into blocks: on some the curve is fitted, others choose its shape, its smoothness
-and its place, and the rest, which no choice has seen, say whether it is a law at all.
+Next to what is decided the best curve of all places is part of the answer (`unnamed_law`) only where the error of the
+augmented model falls with it, on what was fitted and on data that no fit has seen. The samples of each recording are
+cut into blocks: on some the curve is fitted, others choose its shape, its smoothness and its place, and the rest, which
+no choice has seen, say whether it is a law at all.
 """
 
 from __future__ import annotations
@@ -16,51 +17,81 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.inference.hypotheses import Effects as Names, Hypothesis
-from estimator.diagnosis.inference.trials import between_blocks
-from estimator.diagnosis.result import UnnamedTable
-from estimator.diagnosis.table_curves import SLIDER, YIELDING, Curve, Masks, curve_at, shapes, signal_over, values_at
-from estimator.diagnosis.table_descent import Z95, Descent, reported, rms_over, with_curve
+from estimator.diagnosis.inference.decide import Decision
+from estimator.diagnosis.inference.figures import FreeRuns, Unseen, foreign_outputs, on_recordings, rms_of
+from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, all_good_samples
+from estimator.diagnosis.inference.trials import Trial, between_blocks, inside_blocks
+from estimator.diagnosis.result import Fit, Trace, UnnamedTable
+from estimator.diagnosis.table_curves import (
+    GAINS,
+    SEARCHED,
+    SLIDER,
+    STEPS,
+    YIELDING,
+    Z95,
+    Candidate,
+    Curve,
+    Masks,
+    best_curve,
+    curve_at,
+    curve_through,
+    reported,
+    rms_over,
+    scouted,
+    signal_over,
+    values_at,
+)
 from estimator.diagnosis.table_words import looks_like, shortest_formula
-from estimator.physics.driveline import Structure
+from estimator.diagnosis.thresholds import Curves
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.effect import Element
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, unit
+from estimator.physics.problem import outputs_at, residual_at
 from estimator.physics.tables import PLACES, Table
 from estimator.signals.record import BoolArray, FloatArray, Record
 
-SEARCHED = {
-    Structure.ONE_MASS: ("torque", "motor_speed"),
-    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
-    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
-    Structure.JOINT: ("shaft_twist", "shaft_rate"),
-}
-"""Places at which a curve is looked for."""
-
-BLOCKS, CHOOSING, UNSEEN = 10, (2, 7), (4, 9)
-"""Blocks of equal length that each recording is cut into, and which of them choose and which judge; to the rest curves
-are fitted. The last one judges: what has run away by then is no law."""
-
-BETTER = 0.97
-"""Error on the unseen blocks, over that of the re-tuned model, up to which a curve is a law."""
-
-LOOK_ALIKE_SHARE = 1.1  # the same of a second place over the first, up to which both are reported
-
-GAINS = (0.3, 0.1, 0.03, 0.01, 0.0)
-"""Gains of the observer, one after the other."""
-
-SCOUTS, SCOUT_STEPS, STEPS, LAST_STEPS = 2, 3, 4, 10
-"""Gains after which only the best shapes and places continue; Jacobians at each gain there, behind, and at the end."""
-
-CONTINUED = 2  # shapes of a place, and places, that continue
 AT_SLIDER = slot(SLIDER, "friction_nm")
-SMOOTHNESS = (1.0, 0.05)
-"""Weights of the curve's bending that are tried: what its slope changes by from one piece to the next, squared, counts
-as so many thousandths of the squared error before."""
+
+VARIABLES: Mapping[Element, str] = {
+    Element.TORQUE_PATH: "torque",
+    Element.MOTOR: "motor_speed",
+    Element.SHAFT: "shaft_twist",
+    Element.LOAD: "load_speed",
+}
+"""The variable that a law's curve is over, by the law's element; a reading has none."""
+
+NO_LAW = (
+    f"No law without a name is in the augmented model: no curve with {Curves.FEWEST_SAMPLES} samples between its knots "
+    "lowers the error on data that no fit has seen."
+)
 
 
-Effects = Mapping[str, Mapping[str, EffectValue]]
+def free_form(without: Trial, name: str) -> Trial | None:
+    """Return a set without a name, with a free form of one of its laws at the name's element; None where none has one.
+
+    Of several measured outputs there is none: a curve is fitted to the first.
+    """
+    element = EFFECTS[name].element
+    if element not in VARIABLES or without.hypothesis.outputs > 1:
+        return None
+    if all(EFFECTS[other].element is not element for other in without.effects):
+        return None
+    hypothesis, result = without.hypothesis, without.hypothesis.result
+    problem = replace(result.problem, use=between_blocks(result.problem.records))
+    curve = curve_through(replace(result, problem=problem).first_outputs(), VARIABLES[element])
+    if curve is None:
+        return None
+    tuned, x = curve.descent.at(0.0), curve.descent.x(curve.z)
+    outputs = outputs_at(tuned, x)
+    free = FitResult(tuned, x, outputs, residual_at(tuned, outputs), None, False)
+    squares, samples = inside_blocks(free)
+    return Trial(hypothesis, without.size + 1, free, squares, samples)
+
+
+Values = Mapping[str, Mapping[str, EffectValue]]
 """Values of effects, by name and parameter."""
 
 
@@ -71,8 +102,8 @@ class TableFit:
     table: Table  # place, knots and values
     result: FitResult  # the free run with it, the line re-tuned next to it; the curve stands in ``problem.p``
     law: UnnamedTable  # as it is reported
-    effects: Effects  # that the model gets: the table, and the slider of one that yields
-    between: tuple[FitResult, Effects] | None  # both, fitted to what is between the blocks that judge a diagnosis
+    effects: Values  # that the model gets: the table, and the slider of one that yields
+    between: tuple[FitResult, Values] | None  # both, fitted to what is between the blocks that judge a diagnosis
 
 
 def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequence[int]) -> Masks:
@@ -80,58 +111,9 @@ def blocks_of(records: Sequence[Record], use: Sequence[BoolArray], which: Sequen
     masks = []
     for record, used in zip(records, use, strict=True):
         since = record.time_s - record.time_s[0]
-        block = np.minimum((BLOCKS * since / max(float(since[-1]), 1e-12)).astype(int), BLOCKS - 1)
+        block = np.minimum((Curves.BLOCKS * since / max(float(since[-1]), 1e-12)).astype(int), Curves.BLOCKS - 1)
         masks.append(used & np.isin(block, which))
     return tuple(masks)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """The best curve of a place, fitted to the samples that fit."""
-
-    descent: Descent  # for this place
-    z: FloatArray  # unknowns, scaled
-    smooth: float  # weight of the curve's second differences
-    chosen_by: float  # RMS over the samples that choose
-
-
-Scouted = tuple[Descent, list[tuple[float, FloatArray]]]
-"""A place after the first gains: squared error and unknowns that its shapes leave there, the best of them first."""
-
-
-def _scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
-    """Begin the fit of a curve from each of its shapes."""
-    descent, left = Descent(curve, retuned, fitting), []
-    for slopes in shapes(curve).values():
-        z, squares = descent.start(slopes), np.inf
-        for gain in GAINS[:SCOUTS]:
-            z, squares = descent.fitted(z, gain, SMOOTHNESS[0], SCOUT_STEPS)
-        left.append((squares, z))
-    return descent, sorted(left, key=lambda each: each[0])
-
-
-def _best_curve(scouted: Scouted, choosing: Masks) -> Candidate:
-    """Let the observer's gain down from the best shapes, and return what the choosing samples prefer."""
-    (descent, left), found = scouted, list[Candidate]()
-    for _, z in left[:CONTINUED]:
-        for gain in GAINS[SCOUTS:]:
-            z, _ = descent.fitted(z, gain, SMOOTHNESS[0], STEPS)
-        found.append(Candidate(descent, z, SMOOTHNESS[0], descent.error(z, choosing)))
-    best = min(found, key=lambda each: each.chosen_by)
-    for smooth in SMOOTHNESS[1:]:
-        z, _ = descent.fitted(best.z, 0.0, smooth, STEPS)
-        best = min(best, Candidate(descent, z, smooth, descent.error(z, choosing)), key=lambda each: each.chosen_by)
-    return best
-
-
-def table_at(hypothesis: Hypothesis, place: str) -> Candidate | None:
-    """Return the free form of a law at a place, fitted to all samples that count; None where the line hardly moved."""
-    result = hypothesis.result.first_outputs()
-    curve = None if place not in SEARCHED[result.problem.grid.structure] else curve_at(place, result, GAINS[0])
-    if curve is None:
-        return None
-    use = result.problem.use
-    return _best_curve(_scouted(curve, result, use), use)
 
 
 def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[Record] = ()) -> TableFit | None:
@@ -144,38 +126,40 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     if whole.problem.grid.plant is not None:
         return None
     records, use = whole.problem.records, whole.problem.use
-    unseen, choosing = (blocks_of(records, use, which) for which in (UNSEEN, CHOOSING))
+    unseen, choosing = (blocks_of(records, use, which) for which in (Curves.UNSEEN, Curves.CHOOSING))
     fitting = tuple(u & ~a & ~b for u, a, b in zip(use, unseen, choosing, strict=True))
     retuned = fit(replace(whole.problem, use=fitting), whole.x, STEPS)
     searched = [each for each in SEARCHED[whole.problem.grid.structure] if each != YIELDING or not whole.p[AT_SLIDER]]
     curves = [curve_at(place, retuned, GAINS[0]) for place in searched]
-    places = [_scouted(curve, retuned, fitting) for curve in curves if curve is not None]
+    places = [scouted(curve, retuned, fitting) for curve in curves if curve is not None]
     if not places:
         return None
-    continued = sorted(places, key=lambda each: each[1][0][0])[:CONTINUED]
-    best, *others = sorted((_best_curve(each, choosing) for each in continued), key=lambda each: each.chosen_by)
+    continued = sorted(places, key=lambda each: each[1][0][0])[: Curves.CONTINUED]
+    best, *others = sorted((best_curve(each, choosing) for each in continued), key=lambda each: each.chosen_by)
     seen = tuple(u & ~a for u, a in zip(use, unseen, strict=True))
     known = fit(replace(whole.problem, use=seen), whole.x, ITERATIONS)
     before = min(rms_over(known.problem, each.outputs, unseen) for each in (known, retuned))
-    judged, z = _refitted(best, known, seen)
-    after = judged.error(z, unseen)
-    if after > BETTER * before:
+    judged = best.refitted(known, seen)
+    after = judged.descent.error(judged.z, unseen)
+    if after > Curves.BETTER * before:
         return None
-    last, z = _refitted(replace(best, descent=judged, z=z), whole, use)
-    drawn = _drawn_in(replace(best, descent=last, z=z), whole, use)
-    result, table = reported(drawn.descent, drawn.z)
+    last = judged.refitted(whole, use).drawn_in(whole, use)
+    result, table = reported(last)
+    curve = last.descent.curve
+    slope = curve.own * curve.slope_of(result.p)
+    where = signal_over(table.place, result, 0.0)
     kept, torques = ([], []) if len(records) == 1 else _left_out(best, whole, line, hypothesis.effects, table.knots)
     foreign = _squares_on(holdout, line, hypothesis.effects, whole, result)
     if any(sum(after for _, after in each) > sum(before for before, _ in each) for each in (kept, foreign)):
         return None
     firsts = [record.name for record in records if record.lead is None]
-    alike_places = [each.descent.curve.place for each in others if each.chosen_by < LOOK_ALIKE_SHARE * best.chosen_by]
+    near = [each for each in others if each.chosen_by < Curves.LOOK_ALIKE_SHARE * best.chosen_by]
+    alike_places = [each.descent.curve.place for each in near]
     rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
     table, place, at = widened_by_jackknife(table, torques), table.place, PLACES[table.place]
-    slope = drawn.descent.curve.own * drawn.descent.curve.slope_of(result.p)
-    alike, formula, where = looks_like(table, slope), shortest_formula(table, slope), signal_over(place, result, 0.0)
-    if drawn.descent.curve.yields:
+    alike, formula = looks_like(table, slope), shortest_formula(table, slope)
+    if curve.yields:
         of = unit("torque", line.motion)
         alike = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
         formula = ""
@@ -197,45 +181,25 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         rival=next(iter(rivals), ""),
         not_carried=tuple(not_carried),
     )
-    between = None if holdout else _between(drawn, whole)
-    return TableFit(table, result, law, _effects(drawn.descent, result, table), between)
+    between = None if holdout else _between(last, whole)
+    return TableFit(table, result, law, _values(curve, result, table), between)
 
 
-def _effects(descent: Descent, result: FitResult, table: Table) -> Effects:
+def _values(curve: Curve, result: FitResult, table: Table) -> Values:
     """Return what a model with the law gets."""
     effects: dict[str, Mapping[str, EffectValue]] = {table.name: table.effect()}
-    if descent.curve.yields:
+    if curve.yields:
         names = ("friction_nm", "yield_rad", "sharpness")
         effects[SLIDER] = {name: EffectValue(float(result.p[slot(SLIDER, name)])) for name in names}
     return effects
 
 
-def _between(best: Candidate, whole: FitResult) -> tuple[FitResult, Effects]:
+def _between(best: Candidate, whole: FitResult) -> tuple[FitResult, Values]:
     """Return a law that has not seen the blocks by which a diagnosis is judged."""
-    use = tuple(
-        used & seen for used, seen in zip(whole.problem.use, between_blocks(whole.problem.records), strict=True)
-    )
-    descent, z = _refitted(best, fit(replace(whole.problem, use=use), whole.x, STEPS), use)
-    result, table = reported(descent, z)
-    return result, _effects(descent, result, table)
-
-
-def _refitted(best: Candidate, result: FitResult, use: Masks) -> tuple[Descent, FloatArray]:
-    """Fit the best curve to other samples, from where it is."""
-    descent = Descent(best.descent.curve, replace(result, x=result.x), use)
-    z, _ = descent.fitted(best.z, 0.0, best.smooth, LAST_STEPS)
-    return descent, z
-
-
-def _drawn_in(best: Candidate, result: FitResult, use: Masks) -> Candidate:
-    """Draw a curve's knots in to where the simulation with it was, and fit it once more where that changes it."""
-    old, slopes = best.descent, slice(best.descent.first, best.descent.after)
-    curve = old.curve.drawn_in(signal_over(old.curve.place, with_curve(old, best.z), 0.0))
-    between = old.curve.slopes_between(curve.knots, best.z[slopes])
-    descent, z = Descent(curve, result, use), np.concatenate([best.z[: slopes.start], between, best.z[slopes.stop :]])
-    if not curve.yields:  # a straight one is the same through any knots
-        z, _ = descent.fitted(z, 0.0, best.smooth, LAST_STEPS)
-    return replace(best, descent=descent, z=z)
+    seen = between_blocks(whole.problem.records)
+    use = tuple(used & between for used, between in zip(whole.problem.use, seen, strict=True))
+    result, table = reported(best.refitted(fit(replace(whole.problem, use=use), whole.x, STEPS), use))
+    return result, _values(best.descent.curve, result, table)
 
 
 Squares = tuple[float, float]
@@ -243,7 +207,7 @@ Squares = tuple[float, float]
 
 
 def _left_out(
-    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Names, knots: Sequence[float]
+    best: Candidate, whole: FitResult, line: DrivelineModel, effects: Effects, knots: Sequence[float]
 ) -> tuple[list[Squares], list[FloatArray]]:
     """Return, for each recording, the errors on it of a fit to the others, and that fit's torque at some knots.
 
@@ -253,7 +217,7 @@ def _left_out(
     for i, record in enumerate(problem.records):
         seen = tuple(use & (i != j) for j, use in enumerate(problem.use))
         known = fit(replace(problem, use=seen), whole.x, STEPS)
-        with_law, table = reported(*_refitted(best, known, seen))
+        with_law, table = reported(best.refitted(known, seen))
         found += _squares_on([record], line, effects, known, with_law)
         torques.append(values_at(table, at := np.array(knots)) + best.descent.curve.slope_of(with_law.p) * at)
     return found, torques
@@ -274,7 +238,7 @@ def widened_by_jackknife(table: Table, torques: Sequence[FloatArray]) -> Table:
 
 
 def _squares_on(
-    records: Sequence[Record], line: DrivelineModel, effects: Names, without: FitResult, with_law: FitResult
+    records: Sequence[Record], line: DrivelineModel, effects: Effects, without: FitResult, with_law: FitResult
 ) -> list[Squares]:
     """Return the errors of two fits on recordings that they have not seen."""
 
@@ -283,3 +247,75 @@ def _squares_on(
         return float(np.sum((run - record.output)[record.okay] ** 2))
 
     return [(squares(without, record), squares(with_law, record)) for record in records]
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A law without a name that is in the augmented model."""
+
+    fit: Fit  # the decision's figures, those of the augmented model with the law
+    found: TableFit  # its fit to the recordings
+    final: FitResult  # the free runs of all recordings with it
+    line: DrivelineModel  # the line with the law among its effects
+    table: UnnamedTable  # the law, as it is reported
+    said: str  # what is said of it, for the end of a statement
+
+    def augmented(self, model: DrivelineModel) -> DrivelineModel:
+        """Return a model with the law, and the line and its effects as they are next to it."""
+        of_line = self.final.values_of("")
+        parameters = {name: p.at(of_line.get(name, p.value)) for name, p in model.parameters.items()}
+        effects: dict[str, Mapping[str, EffectValue]] = {}
+        for name, values in model.effects.items():
+            found = self.final.values_of(name)
+            effects[name] = {key: value.at(found.get(key, value.value)) for key, value in values.items()}
+        return _with_effects(replace(model, parameters=parameters, effects=effects), self.found.effects)
+
+    def drawn(self, traces: tuple[Trace, ...], believed: Hypothesis, runs: FreeRuns) -> tuple[Trace, ...]:
+        """Return the simulations for plots, the augmented ones with the law."""
+        kept_out = runs.unseen.chain.records
+        outputs = [*runs.chain.read(self.final.outputs)]
+        if kept_out:
+            outputs += foreign_outputs(self.final, self.line, kept_out, all_good_samples(kept_out), believed.effects)
+        return tuple(replace(trace, augmented=out) for trace, out in zip(traces, outputs, strict=True))
+
+
+def unnamed_law(decision: Decision) -> Law | None:
+    """Return the best law without a name next to what is believed; None where nothing is left, or none is better."""
+    judged, runs, figures = decision.judged, decision.runs, decision.figures
+    if not judged.failed or judged.off_nominal:
+        return None
+    believed, line = judged.believed.hypothesis, runs.unseen.line
+    found = best_table(believed, line, runs.unseen.chain.records)
+    if found is None:
+        return None
+    tabled = _with_effects(line, found.effects)
+    with_it = replace(believed, result=found.result)
+    after = on_recordings(with_it, tabled, runs.chain.separated, is_whole=False)
+    result, effects = found.between or (found.result, found.effects)  # recordings that are kept out judge the whole one
+    unseen = Unseen(_with_effects(line, effects), runs.unseen.chain)
+    held = unseen.rms(replace(believed, result=result), after, False, runs.chain, is_as_read=True)
+    final = after.first_outputs()
+    rms = rms_of(runs.chain.errors(final.outputs))
+    if rms >= figures.augmented or held >= figures.holdout_augmented:
+        return None
+    fit = replace(figures, augmented=rms, holdout_augmented=held)
+    law = replace(found.law, rms_before=figures.holdout_augmented, rms_after=held)  # on the samples of all figures
+    return Law(fit, replace(found, law=law), final, tabled, law, sentences(law, fit.unit))
+
+
+def _with_effects(model: DrivelineModel, effects: Values) -> DrivelineModel:
+    return replace(model, effects={**model.effects, **effects})
+
+
+def sentences(table: UnnamedTable, of: str) -> str:
+    """Return what is said of the law, for the end of a statement."""
+    parts = (
+        f"A law without a name is in the augmented model: a torque over {table.over}, through "
+        f"{len(table.knots)} knots. On samples not used for its fit the free-run error falls with it "
+        f"from {table.rms_before:.4g} to {table.rms_after:.4g} {of}.",
+        table.looks_like and f"It looks like {table.looks_like}.",
+        table.formula and f"The shortest formula within its band, with x for {table.over}: {table.formula}.",
+        table.rival and f"A torque over {table.rival} explains nearly as much.",
+        f"It does not carry over to {', '.join(table.not_carried)}." if table.not_carried else "",
+    )
+    return " ".join(filter(None, parts))

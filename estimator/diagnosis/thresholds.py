@@ -110,6 +110,8 @@ class Channels:
 class Inertias:
     """The inertia that torque and motion show (`preconditions/inertia.py`)."""
 
+    # Share of what two signals' likeness is known over, behind which a lag is not looked for
+    LAG_SHARE = 4
     # Ratio of two inertias from which on one of them is invisible from the other: 1 / 1000 of the motion
     UNEQUAL = 1000.0
     # The two bands, in first modes of the nominal model: a mode off by a quarter lies in neither
@@ -136,6 +138,8 @@ class Inertias:
 class Mistakes:
     """Units, signs and columns that are not what they are said to be (the rest of `preconditions/`)."""
 
+    # Powers of ten of a unit such as kNm, and how far a factor that was estimated may be off them
+    DECADES, DECADES_OFF = 3.0, 0.1
     # A driveline sampled slower, or faster, is more likely recorded in another unit of time
     SLOWEST_S, FASTEST_S = 0.5, 1e-5
     SHORTEST_S = 1.0  # no recording of a driveline is shorter
@@ -229,6 +233,9 @@ class Stale:
 class Quantised:
     """Readings in steps, and lost ones (`acquisition/quantised.py`)."""
 
+    FEWEST_LEVELS = 3  # values that differ; fewer show no lattice
+    LARGE = 0.9  # quantile of the values' sizes that counts as the channel's size
+    DECIMAL_OFF = 1e-6  # parts of a decimal place by which a value that was rounded to it may be off, in binary
     # The step is taken at this quantile of the gaps between the values: on a coarse lattice most gaps are the step; on
     # one so fine that gaps are a matter of chance it is too large, which errs to the side of calling repeats innocent
     STEP_QUANTILE = 0.02
@@ -292,7 +299,7 @@ class Jitter:
 
 
 class Fitting:
-    """How far a set is fitted (`inference/hypotheses`, `descent`, `moments`, `disturbances`)."""
+    """How far a set is fitted (`inference/descent`, `disturbances`)."""
 
     LITTLE = 0.2  # fall of the squared innovations, of variance 1, that changes no conclusion
     LEAST_SHARE_OF_PROMISE = 0.5  # share of a step's promise that it must keep for the derivative to be carried on
@@ -312,7 +319,7 @@ class Fitting:
 
 
 class Searching:
-    """Which sets are tried (`inference/search`, `moves`, `score_tests`, `weighted_score_tests`)."""
+    """Which sets are tried (`inference/search`, `moves`, `score_tests`)."""
 
     # How far from a start's own size the first look may place a fit's start: the direction holds no further
     SMALLEST_SCALING, LARGEST_SCALING = 0.1, 4.0
@@ -341,7 +348,7 @@ class Searching:
 
 
 class Checks:
-    """What a hypothesis must pass (`inference/checks.py`)."""
+    """What a hypothesis must pass (`inference/remainder`, `hypotheses`, `fits`)."""
 
     # What their own past may predict of the innovations, and what torque, speed and angle may, beyond chance; the power
     # of a line in their spectrum over their mean power; their mean square in a second, in standard deviations from
@@ -407,9 +414,58 @@ class Places:
     FUNCTION = 0.5  # share of a law's power that must be a function of one signal to be drawn over it
 
 
-class Telling:
-    """What is said, and how long people wait for it (`diagnose.py`, `assemble.py`, `inference/answer`, `wording`)."""
+class Intervals:
+    """How well values are known (`covariance.py`, `inference/figures.py`)."""
 
+    # Lags of the long-run covariance, in correlation lengths of the error, and at most as a part of the shortest error
+    LAGS, LAG_SHARE = 4.0, 4
+    # Widths of a scaled unknown over which a slope is taken: no closer than kinks are, no farther than a law stays one
+    LEAST_WIDTH, MOST_WIDTH = 1e-4, 1e-2
+    FEWEST_SAMPLES = 3.0  # independent samples that an error counts as at least, in an information criterion
+
+
+class StandIns:
+    """The line that stands for a plant of another program (`black_box.py`)."""
+
+    SEARCH_FACTOR = 30.0  # factor, either way, within which values are looked for
+    SHARES = (0.05, 0.3)  # share of the motor in the whole inertia, where a fit starts
+    # Natural frequencies at which one starts: so many between these, and below so many parts of the sampling rate
+    FREQUENCIES, LOWEST_HZ, HIGHEST_HZ, OF_RATE = 5, 1.0, 60.0, 0.25
+    DAMPING = 0.05  # where a fit starts, as a share of critical damping
+    LEAST_VISCOUS = 1e-3  # of a rigid line, as its inertia per second: a regression may end at less than none
+    BETTER = 0.7  # share of a rigid line's error that one with a shaft leaves at most to be taken
+
+
+class Curves:
+    """Laws without a name (`tables.py`, `table_curves.py`), and what they look like (`table_words.py`)."""
+
+    REACH = 1.5  # knots reach to so many times what the re-tuned model reaches
+    FRACTIONS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that, where they stand on both sides of zero
+    EVEN_KNOTS = 7  # knots of a signal of one sign, equally far apart
+    FEWEST_SAMPLES = 40  # samples between two knots at least
+    TWO_SIDED = 0.1  # share of the longer side that the shorter one must reach for knots on both sides of zero
+    # Shares of the reach within which a curve is begun as a gap, a limit, a step: between its innermost knots
+    GAP, LIMIT, STEP = 0.13, 0.2, 0.1
+    # Blocks of equal length that each recording is cut into, and which of them choose and which judge; to the rest
+    # curves are fitted. The last one judges: what has run away by then is no law.
+    BLOCKS, CHOOSING, UNSEEN = 10, (2, 7), (4, 9)
+    BETTER = 0.97  # error on the unseen blocks, over that of the re-tuned model, up to which a curve is a law
+    LOOK_ALIKE_SHARE = 1.1  # the same of a second place over the first, up to which both are reported
+    CONTINUED = 2  # shapes of a place, and places, that continue
+    # How far off its values a curve may be described, as a share of the torque it spans, where its band is narrower;
+    # and where it is wider: any law lies within a band that is as wide as the curve
+    WITHIN, WIDEST = 0.02, 0.1
+    # How far the slope behind a dead band may be from the line's own: a steeper one would make the band wider
+    RETUNED = 0.2
+    # Share of the largest torque from which a knot is at a limit, and how many knots have to be
+    AT_LIMIT, FEWEST_AT_LIMIT = 0.95, 3
+
+
+class Telling:
+    """What is said, and how long people wait for it (`diagnose.py`, `covariance.py`, `say.py`, `wording.py`)."""
+
+    WHOLE_FROM = 100.0  # multiples from which on no decimals are written
+    NO_WORSE = 0.1  # difference in minus twice the log-probability below which a set is as good as another
     # Free runs of all recordings after which a search makes no further step: a choice of how long people wait
     LEVELS: Mapping[str, int] = {"quick": 3_000, "normal": 10_000, "thorough": 100_000}
     MOST_NAMES = 4  # untried effects that a headline lists

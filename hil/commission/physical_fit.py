@@ -117,10 +117,8 @@ def _unknowns(model: DrivelineModel) -> tuple[Shared, ...]:
 
 
 def _summary(model: DrivelineModel, result: FitResult) -> PhysicalFit:
-    from estimator.diagnosis.assemble import (
-        load_torques,  # a second, and the bus comes first
-        reported_covariance,
-    )
+    from estimator.diagnosis.assemble import load_torques
+    from estimator.diagnosis.covariance import reported_covariance
 
     covariance = reported_covariance(result)
     values = {

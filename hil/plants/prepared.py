@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from estimator.diagnosis.preconditions.prepare import with_motion_corrected
+from estimator.diagnosis.preconditions.channels import with_motion_corrected
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.segments import thin
 from estimator.physics.catalogue import EFFECTS

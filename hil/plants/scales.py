@@ -12,9 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimator.diagnosis.preconditions.channels import standstill
+from estimator.diagnosis.preconditions.channels import standstill, with_motion_corrected
 from estimator.diagnosis.preconditions.odds import are_whole_numbers
-from estimator.diagnosis.preconditions.prepare import doubtful, with_motion_corrected
+from estimator.diagnosis.preconditions.plausible import doubtful
 from estimator.diagnosis.result import Diagnosis, Doubt
 from estimator.errors import Cure, EstimatorError, Implausible
 from estimator.physics.model import DrivelineModel

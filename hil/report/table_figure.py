@@ -6,8 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from estimator.diagnosis.result import UnnamedTable
-from estimator.diagnosis.table_answer import sentences
 from estimator.diagnosis.table_curves import values_at
+from estimator.diagnosis.tables import sentences
 from estimator.physics.tables import Table
 from hil.report import page as html
 from hil.report.figures import LEGEND_PX, PANEL_PX, Style, figure_block

@@ -24,9 +24,9 @@ from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.segments import as_slow_as_needed
-from estimator.diagnosis.table_curves import Masks
-from estimator.diagnosis.table_descent import rms_over
-from estimator.diagnosis.tables import CHOOSING, UNSEEN, best_table, blocks_of
+from estimator.diagnosis.table_curves import Masks, rms_over
+from estimator.diagnosis.tables import best_table, blocks_of
+from estimator.diagnosis.thresholds import Curves
 from estimator.errors import EstimatorError
 from estimator.identification.linear_model import Orders
 from estimator.identification.offline.fits import fit_box_jenkins
@@ -68,7 +68,7 @@ def torque_of(record: Record) -> FloatArray:
 def split(records: Sequence[Record]) -> Split:
     """Share the samples out as the search for a law does."""
     use = [record.okay for record in records]
-    unseen, choosing = (blocks_of(records, use, which) for which in (UNSEEN, CHOOSING))
+    unseen, choosing = (blocks_of(records, use, which) for which in (Curves.UNSEEN, Curves.CHOOSING))
     fitting = tuple(u & ~a & ~b for u, a, b in zip(use, unseen, choosing, strict=True))
     return Split(records, fitting, choosing, unseen)
 

@@ -19,11 +19,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimator.diagnosis.acquisition.chain import with_faults_compensated
-from estimator.diagnosis.assemble import Z95, reported_covariance
-from estimator.diagnosis.inference.checks import tests
+from estimator.diagnosis.covariance import Z95, estimate_of, reported_covariance
 from estimator.diagnosis.inference.figures import FreeRuns, on_recordings
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
+from estimator.diagnosis.inference.remainder import tests
 from estimator.signals.record import Record
 from hil.config.model_file import read_model_for_recordings
 from hil.proof.make_case import write_shown
@@ -57,7 +57,8 @@ def values(seed: int) -> Iterator[Value]:
     runs = _fitted(case)
     truth = case.specimen.truth()
     before = reported_covariance(runs.believed.white if runs.is_whole else runs.after)
-    result, now = runs.estimate, runs.covariance
+    estimate = estimate_of(runs.believed, runs.is_whole, runs.after)
+    result, now = estimate.fit, estimate.covariance
     for i, shared in enumerate(result.problem.shared):
         true = _true(shared.effect, shared.name, json.loads(json.dumps(truth)))
         x = float(result.x[i])

@@ -22,9 +22,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.inference.answer import SearchResult, answer
-from estimator.diagnosis.inference.checks import chance, tests
+from estimator.diagnosis.diagnose import SearchResult, answer
 from estimator.diagnosis.inference.hypotheses import silent
+from estimator.diagnosis.inference.remainder import chance, tests
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Counted
 from estimator.diagnosis.thresholds import THRESHOLDS_FILE, Checks
@@ -103,7 +103,7 @@ def decided(form: str, seed: int) -> Row | None:
             NOTHING if world.strong in recognised else world.strong,
             sorted(there | {*world.known}),
             [([each.name, *each.alike], each in established) for each in (*established, *judged.refinements)],
-            [(sorted(each.effects), each.score) for each in fits.ended.values() if fits.is_plausible(each)],
+            [(sorted(each.effects), each.score) for each in fits.ended.values() if each.is_plausible],
             {t.key: t.value - chance(t.key, samples) for t in tests(judged.believed.hypothesis) if t.key},
         )
     )

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from estimator.diagnosis.black_box import acts_around
+from estimator.diagnosis.inference.hypotheses import acts_around
 from estimator.physics.catalogue import EFFECTS
 from hil.cli.main import run
 from hil.errors import UsageError

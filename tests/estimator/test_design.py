@@ -10,10 +10,10 @@ import pytest
 from estimator.design.open import Candidate, Open, Untested, name_of, precision_of as precision
 from estimator.design.paper import LEAST_DIFFERENCE, _on_paper as on_paper, as_model, distance, expected, shown, widths
 from estimator.design.untested import with_untested
-from estimator.diagnosis.inference.descent import descended
+from estimator.diagnosis.inference.descent import THOROUGH, descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import THOROUGH, all_good_samples
+from estimator.diagnosis.inference.hypotheses import all_good_samples
 from estimator.diagnosis.inference.search import search_from_nothing
 from estimator.diagnosis.noise import noise_floor
 from estimator.physics.driveline import InitialCondition

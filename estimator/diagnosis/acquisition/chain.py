@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, flagged, no_cells
+from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding, no_cells, runs
 from estimator.diagnosis.acquisition.jitter import hidden_jitter, mean_shift, stamp_offsets_s, stamped_jitter
 from estimator.diagnosis.acquisition.quantised import lost_samples, speed_quantisation
-from estimator.diagnosis.acquisition.stale import fill, repeated, stale_samples
+from estimator.diagnosis.acquisition.stale import flagged, repeated, stale_samples
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.segments import tiles
-from estimator.diagnosis.thresholds import Quantised
+from estimator.diagnosis.thresholds import Quantised, Stale
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, rates
 from estimator.physics.free_run import NOTHING_KNOWN, FreeRun, Own, free_run
@@ -66,6 +66,99 @@ def _without(record: Record, unread: np.ndarray[tuple[int, int], np.dtype[np.boo
         okay=record.okay & ~unread[:, OUTPUT],
         torque_okay=None if known.all() else known,
     )
+
+
+def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
+    """Return a torque as its reference implies it, the rows in which it does, and whether that is as good as a reading.
+
+    ``torque`` and ``reference`` [Nm] and ``trusted`` have shape (N,). Where the reference does not explain the torque's
+    changes the torque is returned as it is, with no row.
+    """
+    regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
+    predicted = np.all(np.isfinite(regressors), axis=1)
+    read = predicted & trusted
+    both = read[1:] & read[:-1]
+    if read.sum() < Stale.FEWEST_ROWS or not both.any():
+        return torque, np.zeros_like(trusted), False
+    gain = np.linalg.lstsq(regressors[read], torque[read])[0]
+    by_reference = regressors @ gain
+    rows = np.flatnonzero(read)
+    by_reference += np.interp(np.arange(torque.size), rows, (torque - by_reference)[rows])
+    left, change = np.diff(torque - regressors @ gain)[both], np.diff(torque)[both]
+    power_left, power = float(left @ left), float(change @ change)
+    if power_left > Stale.MOST_LEFT * power:
+        return torque, np.zeros_like(trusted), False
+    return by_reference, predicted, power_left <= Stale.AS_GOOD * power
+
+
+def _regressors(reference: FloatArray) -> FloatArray:
+    before = [
+        np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(Stale.PERIODS)
+    ]
+    return np.column_stack([*before, np.ones(reference.size)])
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """When and by how much a torque steps: in rows ``k % period == phase`` [samples], by ``+-step_nm``."""
+
+    period: int  # from tick to tick [samples]
+    phase: int  # row of the first tick, below ``period``
+    step_nm: float  # median size of a step at a tick [Nm]
+    usual_nm: float  # typical change from row to row within a hold [Nm]
+
+    def ticks(self, first: int, last: int) -> list[int]:
+        """Return the ticks from one row to another, both included."""
+        return [row for row in range(first, last + 1) if row % self.period == self.phase]
+
+    def explains(self, change_nm: float) -> bool:
+        """Return whether a change [Nm] is one step of the clock, or so small that there was none."""
+        size = abs(change_nm)
+        return size <= Stale.CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= Stale.SAME_STEP * self.step_nm
+
+
+def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
+    """Return the clock at whose ticks a torque steps; None where there is none of two samples or more."""
+    change = np.abs(np.diff(torque))
+    known = trusted[1:] & trusted[:-1]
+    if known.sum() < Stale.FEWEST_STEPS:
+        return None
+    usual = 1.4826 * float(np.median(change[known]))
+    steps = 1 + np.flatnonzero(known & (change > Stale.CLEAR_STEP * usual))
+    if steps.size < Stale.FEWEST_STEPS:
+        return None
+    for period in range(Stale.LONGEST_HOLD, 1, -1):
+        on_tick = np.bincount(steps % period, minlength=period)
+        if on_tick.max() >= Stale.ON_TICK * steps.size:
+            return Clock(period, int(on_tick.argmax()), float(np.median(change[steps - 1])), usual)
+    return None
+
+
+def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
+    """Fill the rows of a torque [Nm] that are not trusted; return it and the rows that now are known, shape (N,)."""
+    filled, known = _by_clock(torque, trusted)
+    if reference is None or trusted.all():
+        return filled, known
+    by_reference, predicted, as_good = followed(torque, trusted, reference)
+    unread = predicted & ~trusted & (as_good | ~known)
+    filled[unread] = by_reference[unread]
+    return filled, known | (unread & as_good)
+
+
+def _by_clock(torque: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolArray]:
+    clock = clock_of(torque, trusted)
+    filled, known = torque.copy(), trusted.copy()
+    for begin, end in runs(~trusted):
+        before, after = torque[max(begin - 1, 0)], torque[min(end, torque.size - 1)]
+        if begin == 0 or end == torque.size:
+            filled[begin:end] = after if end < torque.size else before
+            continue
+        filled[begin:end] = np.linspace(before, after, end - begin + 2)[1:-1]
+        if clock is not None and clock.explains(after - before) and len(ticks := clock.ticks(begin, end)) < 2:
+            change = ticks[0] if ticks else end
+            filled[begin:change], filled[change:end] = before, after
+            known[begin:end] = True
+    return filled, known
 
 
 def _on_time(record: Record) -> Record:

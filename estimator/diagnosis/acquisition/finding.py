@@ -21,21 +21,6 @@ def channels(record: Record) -> FloatArray:
     return np.column_stack([record.output, torque])
 
 
-def flagged(record: Record) -> BoolArray:
-    """Return the rows that count in no fit: output not read, or no torque input trusted; shape (N,)."""
-    return ~np.isfinite(record.output) | ~record.torque_trusted.any(axis=1)
-
-
-def any_of(cells: BoolArray) -> BoolArray:
-    """Return the rows with at least one True, shape (N,)."""
-    return np.logical_or.reduce(cells, axis=1)
-
-
-def all_of(cells: BoolArray) -> BoolArray:
-    """Return the rows that are True throughout, shape (N,)."""
-    return np.logical_and.reduce(cells, axis=1)
-
-
 def runs(rows: BoolArray) -> list[tuple[int, int]]:
     """Return where True begins and ends, ``[begin, end)`` of each stretch; of a mask of shape (N,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
@@ -81,7 +66,7 @@ class AcquisitionFinding:
 
     def rows(self, record: Record) -> BoolArray:
         """Return the rows of a recording in which a reading is touched, shape (N,)."""
-        return any_of(self.touched(record))
+        return np.any(self.touched(record), axis=1)
 
 
 def no_cells(record: Record) -> BoolArray:

@@ -13,8 +13,6 @@ from estimator.diagnosis.acquisition.finding import (
     OUTPUT,
     AcquisitionFinding,
     Sized,
-    all_of,
-    any_of,
     channels,
     mean_run,
     no_cells,
@@ -42,7 +40,7 @@ def shorter_runs(rows: BoolArray, longest: int) -> BoolArray:
 def lattice_step(values: FloatArray) -> float:
     """Return the step of the lattice that values lie on [unit of the values]; tiny where they lie on none."""
     levels = np.unique(values[np.isfinite(values)])
-    if levels.size < 3:
+    if levels.size < Quantised.FEWEST_LEVELS:
         return 0.0
     gaps = np.diff(levels)
     gaps = gaps[gaps > Quantised.ROUND_OFF * float(np.abs(levels).max())]
@@ -53,59 +51,10 @@ def decimal_place(values: FloatArray) -> float:
     """Return the decimal place that values were rounded to when they were written [their unit], 0 where to none."""
     for decimals in range(Quantised.DECIMALS + 1):
         ticks = values * 10.0**decimals
-        if float(np.abs(ticks - np.round(ticks)).max()) < 1e-6 * max(1.0, 1e-9 * float(np.abs(ticks).max())):
+        off, size = float(np.abs(ticks - np.round(ticks)).max()), float(np.abs(ticks).max())
+        if off < Quantised.DECIMAL_OFF * max(1.0, 1e-9 * size):
             return float(10.0**-decimals)
     return 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class ChanceRepeats:
-    """How often a reading equals the one before by chance."""
-
-    expected: float  # best estimate of their number
-    upper: float  # most that chance gives, two standard errors above it
-
-
-def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
-    """Predict from differences other than zero how many are zero.
-
-    A Gaussian is drawn through the counts of two bands next to zero, ``0 < |d| <= w`` and ``w < |d| <= 2w``: it has
-    ``ln p(d)`` linear in d^2, and locally so has every smooth density that is symmetric about zero.
-    """
-    size = np.abs(differences)
-    moving = size[size > 0.5 * step] if step > 0.0 else size[size > 0.0]
-    if moving.size == 0:
-        return ChanceRepeats(float(size.size), float(size.size))
-    if step <= 0.0:  # without a lattice none is zero by chance
-        return ChanceRepeats(0.0, _most_common(differences, step))
-    points = max(1, math.floor(float(np.quantile(moving, Quantised.CORE_QUANTILE)) / step + 0.5))
-    near = float(np.sum(moving <= (points + 0.5) * step))
-    far = float(np.sum(moving <= (2 * points + 0.5) * step)) - near
-    # Half an event more keeps the logarithms finite where a band is empty.
-    near_rate, far_rate = (near + 0.5) / (2 * points), (far + 0.5) / (2 * points)
-    inner, whole = ((n + 1) * (2 * n + 1) / 6.0 for n in (points, 2 * points))  # mean squares of the lags up to n
-    lever = inner / (2.0 * (whole - inner))
-    slope = max(math.log(near_rate / far_rate), 0.0)
-    expected = near_rate * math.exp(lever * slope)
-    sampling = math.hypot((1.0 + lever) / math.sqrt(near + 0.5), lever / math.sqrt(far + 0.5))
-    upper = max(expected * (1.0 + Quantised.MODEL_ERROR + 2.0 * sampling), _most_common(differences, step))
-    return ChanceRepeats(min(expected, float(size.size)), min(upper, float(size.size)))
-
-
-def _most_common(differences: FloatArray, step: float) -> float:
-    """Return how often the most common change other than none occurs."""
-    counts = np.round(differences / step) if step > 0.0 else differences
-    _, times = np.unique(counts[counts != 0.0], return_counts=True)
-    return float(times.max()) if times.size else 0.0
-
-
-def repeats(values: FloatArray, step: float) -> BoolArray:
-    """Return the rows whose reading equals the one before, shape (N,); False in the first and where none was read."""
-    found = np.zeros(values.shape, dtype=np.bool_)
-    read = values[np.isfinite(values)]
-    if read.size:
-        found[1:] = np.abs(np.diff(values)) <= Quantised.ROUND_OFF * max(float(np.abs(read).max()), step)
-    return found
 
 
 def speed_quantisation(records: Sequence[Record]) -> AcquisitionFinding | None:
@@ -244,7 +193,7 @@ def _with_their_frames(read: Sequence[FloatArray], lost: Sequence[BoolArray]) ->
     whole = [cells.copy() for cells in lost]
     for column in range(max(cells.shape[1] for cells in lost)):
         having = [k for k, cells in enumerate(lost) if cells.shape[1] > column]
-        others = [any_of(np.delete(lost[k], column, axis=1)) for k in having]
+        others = [np.any(np.delete(lost[k], column, axis=1), axis=1) for k in having]
         zero = [read[k][:, column] == 0.0 for k in having]
         rows, zeros = np.concatenate(others), np.concatenate(zero)
         usual = float(np.mean(zeros[~rows]))
@@ -262,7 +211,9 @@ def _zeros_of(series: Sequence[FloatArray]) -> tuple[list[BoolArray], float]:
     step = lattice_step(pooled)
     if step == 0.0:
         return none, 1.0
-    near = max((Quantised.NEAR_STEPS + 0.5) * step, Quantised.NEAR_SHARE * float(np.quantile(np.abs(pooled), 0.9)))
+    near = max(
+        (Quantised.NEAR_STEPS + 0.5) * step, Quantised.NEAR_SHARE * float(np.quantile(np.abs(pooled), Quantised.LARGE))
+    )
     rows = [_out_of_line(values, near) for values in series]
     count = sum(int(found.sum()) for found in rows)
     if count < sum(
@@ -328,7 +279,7 @@ def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
     zeros, p_value = lost_zeros(records)
     missing = [_missing(record) for record in records]
     cells = [absent | zero for absent, zero in zip(missing, zeros, strict=True)]
-    rows = [any_of(lost) for lost in cells]
+    rows = [np.any(lost, axis=1) for lost in cells]
     count, total = sum(int(lost.sum()) for lost in rows), sum(lost.size for lost in rows)
     if count < Findings.SMALLEST_SHARE * total:
         return None
@@ -351,7 +302,7 @@ def lost_samples(records: Sequence[Record]) -> AcquisitionFinding | None:
 def _missing(record: Record) -> BoolArray:
     """Return what the recording itself says is missing, gaps left out; shape (N, 1 + M)."""
     lost = ~record.torque_trusted
-    whole_row = all_of(lost) & ~record.okay
+    whole_row = np.all(lost, axis=1) & ~record.okay
     lost = np.column_stack([~np.isfinite(record.output) | whole_row, lost])
-    short = shorter_runs(any_of(lost), Quantised.LONGEST_BURST)
+    short = shorter_runs(np.any(lost, axis=1), Quantised.LONGEST_BURST)
     return lost & short[:, np.newaxis]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,18 +14,71 @@ from estimator.diagnosis.acquisition.finding import (
     OUTPUT,
     AcquisitionFinding,
     Sized,
-    all_of,
     channels,
-    flagged,
     mean_run,
     no_cells,
     predict,
     runs,
     share_interval,
 )
-from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step, repeats
-from estimator.diagnosis.thresholds import Findings, Noise, Stale
+from estimator.diagnosis.acquisition.quantised import lattice_step
+from estimator.diagnosis.thresholds import Findings, Noise, Quantised, Stale
 from estimator.signals.record import BoolArray, FloatArray, Record
+
+
+@dataclass(frozen=True, slots=True)
+class ChanceRepeats:
+    """How often a reading equals the one before by chance."""
+
+    expected: float  # best estimate of their number
+    upper: float  # most that chance gives, two standard errors above it
+
+
+def chance_repeats(differences: FloatArray, step: float) -> ChanceRepeats:
+    """Predict from differences other than zero how many are zero.
+
+    A Gaussian is drawn through the counts of two bands next to zero, ``0 < |d| <= w`` and ``w < |d| <= 2w``: it has
+    ``ln p(d)`` linear in d^2, and locally so has every smooth density that is symmetric about zero.
+    """
+    size = np.abs(differences)
+    moving = size[size > 0.5 * step] if step > 0.0 else size[size > 0.0]
+    if moving.size == 0:
+        return ChanceRepeats(float(size.size), float(size.size))
+    if step <= 0.0:  # without a lattice none is zero by chance
+        return ChanceRepeats(0.0, _most_common(differences, step))
+    points = max(1, math.floor(float(np.quantile(moving, Quantised.CORE_QUANTILE)) / step + 0.5))
+    near = float(np.sum(moving <= (points + 0.5) * step))
+    far = float(np.sum(moving <= (2 * points + 0.5) * step)) - near
+    # Half an event more keeps the logarithms finite where a band is empty.
+    near_rate, far_rate = (near + 0.5) / (2 * points), (far + 0.5) / (2 * points)
+    inner, whole = ((n + 1) * (2 * n + 1) / 6.0 for n in (points, 2 * points))  # mean squares of the lags up to n
+    lever = inner / (2.0 * (whole - inner))
+    slope = max(math.log(near_rate / far_rate), 0.0)
+    expected = near_rate * math.exp(lever * slope)
+    sampling = math.hypot((1.0 + lever) / math.sqrt(near + 0.5), lever / math.sqrt(far + 0.5))
+    upper = max(expected * (1.0 + Quantised.MODEL_ERROR + 2.0 * sampling), _most_common(differences, step))
+    return ChanceRepeats(min(expected, float(size.size)), min(upper, float(size.size)))
+
+
+def _most_common(differences: FloatArray, step: float) -> float:
+    """Return how often the most common change other than none occurs."""
+    counts = np.round(differences / step) if step > 0.0 else differences
+    _, times = np.unique(counts[counts != 0.0], return_counts=True)
+    return float(times.max()) if times.size else 0.0
+
+
+def repeats(values: FloatArray, step: float) -> BoolArray:
+    """Return the rows whose reading equals the one before, shape (N,); False in the first and where none was read."""
+    found = np.zeros(values.shape, dtype=np.bool_)
+    read = values[np.isfinite(values)]
+    if read.size:
+        found[1:] = np.abs(np.diff(values)) <= Quantised.ROUND_OFF * max(float(np.abs(read).max()), step)
+    return found
+
+
+def flagged(record: Record) -> BoolArray:
+    """Return the rows that count in no fit: output not read, or no torque input trusted; shape (N,)."""
+    return ~np.isfinite(record.output) | ~np.any(record.torque_trusted, axis=1)
 
 
 def informative_rows(values: FloatArray, step: float) -> BoolArray:
@@ -119,99 +173,6 @@ def _ratio(after: FloatArray, usual: FloatArray) -> float:
     return float(np.median(after) / np.median(usual)) if after.size and usual.size else 0.0
 
 
-def followed(torque: FloatArray, trusted: BoolArray, reference: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
-    """Return a torque as its reference implies it, the rows in which it does, and whether that is as good as a reading.
-
-    ``torque`` and ``reference`` [Nm] and ``trusted`` have shape (N,). Where the reference does not explain the torque's
-    changes the torque is returned as it is, with no row.
-    """
-    regressors = _regressors(np.where(~trusted & (reference == 0.0), np.nan, reference))  # lost with the torque
-    predicted = all_of(np.isfinite(regressors))
-    read = predicted & trusted
-    both = read[1:] & read[:-1]
-    if read.sum() < Stale.FEWEST_ROWS or not both.any():
-        return torque, np.zeros_like(trusted), False
-    gain = np.linalg.lstsq(regressors[read], torque[read])[0]
-    by_reference = regressors @ gain
-    rows = np.flatnonzero(read)
-    by_reference += np.interp(np.arange(torque.size), rows, (torque - by_reference)[rows])
-    left, change = np.diff(torque - regressors @ gain)[both], np.diff(torque)[both]
-    power_left, power = float(left @ left), float(change @ change)
-    if power_left > Stale.MOST_LEFT * power:
-        return torque, np.zeros_like(trusted), False
-    return by_reference, predicted, power_left <= Stale.AS_GOOD * power
-
-
-def _regressors(reference: FloatArray) -> FloatArray:
-    before = [
-        np.concatenate([np.full(lag, reference[0]), reference[: reference.size - lag]]) for lag in range(Stale.PERIODS)
-    ]
-    return np.column_stack([*before, np.ones(reference.size)])
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """When and by how much a torque steps: in rows ``k % period == phase`` [samples], by ``+-step_nm``."""
-
-    period: int  # from tick to tick [samples]
-    phase: int  # row of the first tick, below ``period``
-    step_nm: float  # median size of a step at a tick [Nm]
-    usual_nm: float  # typical change from row to row within a hold [Nm]
-
-    def ticks(self, first: int, last: int) -> list[int]:
-        """Return the ticks from one row to another, both included."""
-        return [row for row in range(first, last + 1) if row % self.period == self.phase]
-
-    def explains(self, change_nm: float) -> bool:
-        """Return whether a change [Nm] is one step of the clock, or so small that there was none."""
-        size = abs(change_nm)
-        return size <= Stale.CLEAR_STEP * self.usual_nm or abs(size - self.step_nm) <= Stale.SAME_STEP * self.step_nm
-
-
-def clock_of(torque: FloatArray, trusted: BoolArray) -> Clock | None:
-    """Return the clock at whose ticks a torque steps; None where there is none of two samples or more."""
-    change = np.abs(np.diff(torque))
-    known = trusted[1:] & trusted[:-1]
-    if known.sum() < Stale.FEWEST_STEPS:
-        return None
-    usual = 1.4826 * float(np.median(change[known]))
-    steps = 1 + np.flatnonzero(known & (change > Stale.CLEAR_STEP * usual))
-    if steps.size < Stale.FEWEST_STEPS:
-        return None
-    for period in range(Stale.LONGEST_HOLD, 1, -1):
-        on_tick = np.bincount(steps % period, minlength=period)
-        if on_tick.max() >= Stale.ON_TICK * steps.size:
-            return Clock(period, int(on_tick.argmax()), float(np.median(change[steps - 1])), usual)
-    return None
-
-
-def fill(torque: FloatArray, trusted: BoolArray, reference: FloatArray | None = None) -> tuple[FloatArray, BoolArray]:
-    """Fill the rows of a torque [Nm] that are not trusted; return it and the rows that now are known, shape (N,)."""
-    filled, known = _by_clock(torque, trusted)
-    if reference is None or trusted.all():
-        return filled, known
-    by_reference, predicted, as_good = followed(torque, trusted, reference)
-    unread = predicted & ~trusted & (as_good | ~known)
-    filled[unread] = by_reference[unread]
-    return filled, known | (unread & as_good)
-
-
-def _by_clock(torque: FloatArray, trusted: BoolArray) -> tuple[FloatArray, BoolArray]:
-    clock = clock_of(torque, trusted)
-    filled, known = torque.copy(), trusted.copy()
-    for begin, end in runs(~trusted):
-        before, after = torque[max(begin - 1, 0)], torque[min(end, torque.size - 1)]
-        if begin == 0 or end == torque.size:
-            filled[begin:end] = after if end < torque.size else before
-            continue
-        filled[begin:end] = np.linspace(before, after, end - begin + 2)[1:-1]
-        if clock is not None and clock.explains(after - before) and len(ticks := clock.ticks(begin, end)) < 2:
-            change = ticks[0] if ticks else end
-            filled[begin:change], filled[change:end] = before, after
-            known[begin:end] = True
-    return filled, known
-
-
 @dataclass(frozen=True, slots=True)
 class LateTorque:
     """What one recording says of some torque inputs together."""
@@ -226,8 +187,8 @@ class LateTorque:
 def late_torque(record: Record, inputs: Sequence[int], trusted: BoolArray) -> LateTorque | None:
     """Examine torque inputs that may be stale in the same rows; None where no predictor can be fitted."""
     torque = record.torque_nm[:, inputs].sum(axis=1)
-    read = all_of(record.torque_trusted[:, inputs])
-    again = read & all_of(np.column_stack([_repeats(record.torque_nm[:, i]) for i in inputs]))
+    read = np.all(record.torque_trusted[:, inputs], axis=1)
+    again = read & np.all(np.column_stack([_repeats(record.torque_nm[:, i]) for i in inputs]), axis=1)
     step = np.append(np.where(read[1:], np.diff(torque), 0.0), 0.0)  # from this row to the next
     found, stale = None, np.zeros_like(read)
     for clear in Stale.CLEAR:

@@ -23,11 +23,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.inference.checks import Test, is_possible, tests
+from estimator.diagnosis.inference.descent import covariance_of_innovations, fitted
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs, of_spread
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import NOTHING, Catalogue, Effects, Hypothesis, covariance, fitted
+from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, is_possible
 from estimator.diagnosis.inference.moves import fit_look_alikes
+from estimator.diagnosis.inference.remainder import Test, tests
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.trials import Standing, Trial, necessity, noise_of, tried
 from estimator.diagnosis.noise import noise_floor
@@ -113,9 +114,9 @@ def decide(search: Search, chain: Chain, unseen: Unseen, rival: Rival = no_rival
 def _with_runs(judged: Judged, chain: Chain, unseen: Unseen) -> Decision:
     nothing, believed = judged.nothing.hypothesis, judged.believed.hypothesis
     runs = free_runs(nothing, believed, not judged.failed, chain, unseen)
-    findings = acquired(runs)
+    findings, left = acquired(runs), of_spread(runs.final)
     figures = figures_of(runs, judged.noise)
-    verdict = verdict_of(of_spread(runs.final), bool(judged.named or findings), bool(judged.failed))
+    verdict = verdict_of(left, bool(judged.named or findings), bool(judged.failed))
     if judged.off_nominal and verdict is Verdict.NO_MISMATCH:
         verdict = Verdict.UNEXPLAINED
     return Decision(judged, runs, figures, findings, verdict)
@@ -234,7 +235,7 @@ def _is_rather(sheet: FreeLine, model: DrivelineModel, chosen: Trial, noise: flo
 
 def _nearest(fits: Fits, found: Hypothesis) -> list[Hypothesis]:
     """Return the sets worth a trial: of each size the most probable, and those that simulate best as fitted."""
-    possible = [each for each in fits.ended.values() if fits.is_plausible(each)]
+    possible = [each for each in fits.ended.values() if each.is_plausible]
     chosen: dict[Effects, Hypothesis] = {each.effects: each for each in (fits.nothing(), found)}
     for size in range(1, len(found.effects) + 1):
         same = [each for each in possible if len(each.effects) == size]
@@ -262,9 +263,15 @@ def _standing(name: str, fits: Fits, whole: Trial, noise: float, rival: Rival) -
     needed = necessity(whole, without, noise)
     evidence = without.hypothesis.score - whole.hypothesis.score
     alike = _alike(name, fits, whole, evidence)
-    slight = TOO_SMALL if share < Judging.LEAST_SHARE else "" if fits.is_resolved(whole.hypothesis, name) else TOO_SHORT
+    slight = TOO_SMALL if share < Judging.LEAST_SHARE else "" if _is_resolved(name, fits, whole) else TOO_SHORT
     standing = Standing(name, needed, share, evidence, alike, slight=slight)
     return replace(standing, objection=_against(standing, whole, without, rival))
+
+
+def _is_resolved(name: str, fits: Fits, whole: Trial) -> bool:
+    """Tell whether an effect is large enough to be distinguished from another way of sampling."""
+    values = whole.hypothesis.result.values_of(name)
+    return name == GRADE or not EFFECTS[name].unresolved(fits.model, fits.records, values)
 
 
 def _against(standing: Standing, whole: Trial, without: Trial, rival: Rival) -> str:
@@ -289,7 +296,7 @@ def _alike(name: str, fits: Fits, whole: Trial, evidence: float) -> dict[str, Ma
         for effects, each in sorted(fits.ended.items(), key=lambda item: sorted(item[0]))
         if others <= effects and len(effects - others) == 1 and name not in effects
     ]
-    near = [each for each in exchanged if each.score - best.score < within and fits.is_plausible(each)]
+    near = [each for each in exchanged if each.score - best.score < within and each.is_plausible]
     as_good = [each for each in near if not whole.clearly_beats(fits.trials.one(each))]
     found = {next(iter(each.effects - others)): each for each in as_good} | {name: best}
     values = {other: each.result.values_of(other) for other, each in found.items()}
@@ -348,12 +355,12 @@ def free_line(fits: Fits) -> FreeLine | None:
     off_nominal = _off_nominal(fits, found)
     if not off_nominal:
         return None
-    chosen = Catalogue(len(fits.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
+    chosen = Catalogue(fits.model, len(fits.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
     return FreeLine(found, found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 
 def _off_nominal(fits: Fits, found: Hypothesis) -> tuple[OffNominal, ...]:
-    spread = np.sqrt(np.maximum(np.diag(covariance(found)), 0.0))
+    spread = np.sqrt(np.maximum(np.diag(covariance_of_innovations(found)), 0.0))
     clear = []
     for i, trusted in enumerate(fits.nothing().result.problem.shared):
         ratio = float(found.result.x[i])

@@ -1,31 +1,45 @@
-"""Gauss-Newton descent of the squared innovations, with derivatives that are carried from fit to fit.
+"""How a set of effects is fitted: its unknowns and its disturbances in turn, and moments of events elsewhere.
 
-A derivative by differences costs a simulation per unknown, a step one. So a fit begins with the derivative of the fit
-it extends, of which only the new unknowns' columns are found, and follows it by Broyden's update (Math. Comp. 19,
+The unknowns are found by Gauss-Newton descent of the squared innovations, with derivatives that are carried from fit to
+fit. A derivative by differences costs a simulation per unknown, a step one. So a fit begins with the derivative of the
+fit it extends, of which only the new unknowns' columns are found, and follows it by Broyden's update (Math. Comp. 19,
 1965; with Marquardt's damping: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems, DTU 2004,
 3.5). It is found anew where a step does not keep what it promised, and before a fit counts as ended. Derivatives are
 those of the plain errors: they hold under any weighting.
+
+The squared innovations have a minimum near every edge that an event may begin or end at, and a descent finds the
+nearest. So the likelihood is looked at elsewhere in the whole recording, all else as a fit has it
+(`with_better_moments`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.diagnosis.inference.disturbances import Limits, Whitener, estimated, whitener_of
+from estimator.diagnosis.inference.hypotheses import Catalogue, Effects, Hypothesis, hypothesis_of
 from estimator.diagnosis.thresholds import Fitting
 from estimator.least_squares import damped_step
-from estimator.physics.fit import FitResult, in_common
-from estimator.physics.jacobian import jacobian_at
-from estimator.physics.problem import Problem, bounds, outputs_at, residual_at
-from estimator.signals.record import FloatArray
+from estimator.physics.catalogue import EFFECTS
+from estimator.physics.fit import MOMENT_NAMES, FitResult, in_common
+from estimator.physics.jacobian import changes, jacobian_at
+from estimator.physics.problem import Problem, bounds, outputs_at, own_part, residual_at, simulated_each
+from estimator.physics.unknowns import LocalBasis
+from estimator.signals.record import FloatArray, Record
 
 Weigh = Callable[[FloatArray], FloatArray]
 
 FIRST_DAMPING = 1e-3
 EASE, STIFFEN = 0.2, 5.0
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 1e8
+
+_OFFSETS_S = np.array([0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4, 5.0, 10.0])
+OFFSETS_S = np.concatenate([-_OFFSETS_S[::-1], _OFFSETS_S])
+"""Where else the likelihood is looked at, around the moment a fit ended at; and at the recording's own ends."""
 
 MUCH_BYTES = 2**25  # room of a derivative that is rather found again than kept with a fit that is over
 
@@ -36,6 +50,79 @@ class Effort:
 
     derivatives: int  # how often they are found anew at most
     steps: int  # at most
+
+
+THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
+"""What a pass may cost at most, and a first comparison."""
+
+
+def fitted(
+    effects: Effects,
+    initial: FitResult,
+    sizes: FloatArray,
+    limits: Limits,
+    catalogue: Catalogue,
+    rival: float = math.nan,
+) -> Hypothesis:
+    """Fit a hypothesis from a free run and disturbances ``sizes``.
+
+    ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
+    less the last digits matter. Without one it is fitted to its end.
+    """
+    result, sizes = initial, np.clip(sizes, limits.low, limits.high)
+    best, least, passes = (result, sizes), math.inf, 0
+    while passes < Fitting.MOST_PASSES:
+        result = descended(result, whitener_of(result, sizes), THOROUGH)
+        if passes < Fitting.WITH_MOMENTS:
+            result = _with_moments(result, sizes)
+        is_anew = passes == 0 and math.isnan(rival)  # with a rival they begin where its own ended
+        sizes, now = estimated(result, result.residual, sizes, limits, Fitting.ROUNDS, is_anew)
+        digits = 0.0 if math.isnan(rival) else Fitting.DIGITS * abs(now - rival)
+        is_last = passes > 0 and now > least - max(Fitting.SETTLED_DEVIANCE, digits)
+        if passes == 0 or now < least:
+            best, least = (result, sizes), now
+        if is_last:
+            break
+        passes += 1
+    ended, sizes = without_derivative(best[0]), best[1]
+    return hypothesis_of(effects, ended, sizes, limits, least, catalogue)
+
+
+def compared(
+    effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, catalogue: Catalogue
+) -> Hypothesis:
+    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
+    result, now = initial, math.inf
+    sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
+    for _ in range(Fitting.MOST_ROUGH):
+        result = descended(result, whitener_of(result, sizes), ROUGH)
+        sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
+        if now > best - Fitting.MUCH * result.residual.size:
+            break
+        best = now
+    return hypothesis_of(effects, result, sizes, limits, now, catalogue)
+
+
+def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
+    """Return a fit with moments of events where the innovations are least, and fitted from there."""
+    if not has_moments(result.problem):
+        return result
+    for _ in range(2):
+        found = with_better_moments(result, whitener_of(result, sizes))
+        if found is None:
+            break
+        result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)
+    return result
+
+
+def covariance_of_innovations(hypothesis: Hypothesis) -> FloatArray:
+    """Return the covariance of the scaled unknowns, shape (U, U): the inverse of the Fisher information."""
+    white = hypothesis.white
+    free = ~white.pinned
+    full = np.zeros((white.x.size, white.x.size))
+    j = white.jacobian[:, free]
+    full[np.ix_(free, free)] = np.linalg.pinv(j.T @ j, hermitian=True)
+    return full
 
 
 def extended(problem: Problem, x: FloatArray, previous: FitResult, anew: str = "") -> FitResult:
@@ -140,3 +227,91 @@ class _Descent:
             self._derivative = self._derivative + np.outer(missed, moved)
             self._x, self._outputs, self._errors, self._innovations = x, outputs, errors, innovations
         return gained
+
+
+def with_better_moments(result: FitResult, filtered: Whitener) -> tuple[Problem, FloatArray] | None:
+    """Return a problem and its unknowns with moments where the innovations are less; None where they are nowhere.
+
+    A fit may move them from there as far as it could before.
+    """
+    problem, x, better = result.problem, result.x.copy(), False
+    bases = list(problem.local)
+    for i, basis in enumerate(problem.bases):
+        local = _moved_in(result, filtered, i)
+        if local is not None:
+            x[own_part(problem, i)], better = local, True
+            bases[i] = _around(basis, local, problem.records[i])
+    return (replace(problem, local=tuple(bases[lead] for lead in problem.leads)), x) if better else None
+
+
+def _around(basis: LocalBasis, local: FloatArray, record: Record) -> LocalBasis:
+    """Return a basis with the bounds of movable moments as wide as before, around where they are."""
+    first, last = (float(each) for each in record.since_start_s[[0, -1]])
+    last += record.sample_time_s
+    own = []
+    for row, unknown in enumerate(basis.own, start=basis.own_rows.start):
+        if EFFECTS[unknown.effect].event and unknown.low < unknown.high:
+            at, reach = float(local[row]), 0.5 * (unknown.high - unknown.low)
+            unknown = replace(unknown, start=at, low=max(first, at - reach), high=min(last, at + reach))
+        own.append(unknown)
+    return replace(basis, own=tuple(own))
+
+
+def _moved_in(result: FitResult, filtered: Whitener, index: int) -> FloatArray | None:
+    basis, local = result.problem.local[index], result.local_of(index).copy()
+    ends = _ends(basis)
+    if not ends:
+        return None
+    taken_up = _initial_state(result, filtered, index)
+    began = best = float(_squares(result, filtered, index, taken_up, [local])[0])
+    first, last = (float(each) for each in result.problem.records[index].since_start_s[[0, -1]])
+    for begin, end in ends:
+        may_move = [row for row in (begin, end) if basis.low[row] < basis.high[row]]
+        sets = [[row] for row in may_move] + ([may_move] if len(may_move) > 1 else [])
+        for _ in range(Fitting.MOVES):
+            tried = [_shifted(local, rows, offset) for rows in sets for offset in OFFSETS_S]
+            tried += [_shifted(local, [row], {begin: first, end: last}[row] - local[row]) for row in may_move]
+            tried = [each for each in tried if first <= each[begin] <= each[end] <= max(last, local[end])]
+            if not tried:
+                break
+            squares = _squares(result, filtered, index, taken_up, tried)
+            if squares.min() >= best:
+                break
+            best, local = float(squares.min()), tried[int(squares.argmin())]
+    return local if best < began - Fitting.WORTH_MOVING else None
+
+
+def _shifted(local: FloatArray, rows: list[int], offset_s: float) -> FloatArray:
+    x = local.copy()
+    x[rows] += offset_s
+    return x
+
+
+def _ends(basis: LocalBasis) -> list[tuple[int, int]]:
+    """Return where beginning and end of each event stand among a recording's unknowns."""
+    place = {(u.effect, u.name): row for row, u in enumerate(basis.own, start=basis.own_rows.start)}
+    movable = {u.effect for u in basis.own if EFFECTS[u.effect].event and u.low < u.high}
+    return [(place[effect, "from_s"], place[effect, "to_s"]) for effect in sorted(movable)]
+
+
+def _initial_state(result: FitResult, filtered: Whitener, index: int) -> FloatArray:
+    """Return an orthonormal basis of what load torque and initial state do to the innovations."""
+    first = own_part(result.problem, index).start
+    columns = np.arange(first, first + result.problem.local[index].own_rows.start)
+    return np.linalg.qr(filtered.part(index, changes(result.problem, result.x, index, columns, result.outputs)))[0]
+
+
+def _squares(
+    result: FitResult, filtered: Whitener, index: int, taken_up: FloatArray, tried: list[FloatArray]
+) -> FloatArray:
+    """Return the squared innovations for each of several vectors that differ in moments, shape (K,)."""
+    problem = result.problem
+    measured = np.concatenate([problem.records[i].output[problem.use[i]] for i in problem.drives[index]])
+    outputs = simulated_each(problem, [(result.p, x) for x in tried], index)
+    errors = filtered.part(index, (outputs - measured).T).T
+    return (errors**2).sum(axis=1) - ((errors @ taken_up) ** 2).sum(axis=1)
+
+
+def has_moments(problem: Problem) -> bool:
+    """Tell whether a fit may move the moment of an event."""
+    return any(u.name in MOMENT_NAMES and u.low < u.high for basis in problem.bases for u in basis.own)

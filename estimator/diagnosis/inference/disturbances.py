@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from estimator.diagnosis.line.line import LASTS, FormPlace, LinearLine, form_changes, line_of
+from estimator.diagnosis.line.line import LASTS, FormPlace, LinearLine, changes_of, line_of
 from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.priors import DisturbancePriors
@@ -97,15 +97,9 @@ def whitening_of(result: FitResult) -> Callable[[FloatArray], Whitener]:
     for output, part in enumerate(parts):
         for i in range(part.start, part.stop):
             use[problem.leads[i]][:, output] = problem.use[i]
+    line, changes = line_of(result), changes_of(result)
     unread = [stand_in_variance(record) for record in firsts]
-    changes = changes_of(result)
-    return partial(whitener, line_of(result), firsts[0].sample_time_s, use, unread, problem.rows, changes=changes)
-
-
-def changes_of(result: FitResult) -> tuple[FloatArray, ...]:
-    """Return how much laws change in each recording at each place, shape (3, N_i); nothing where none does."""
-    each = tuple(form_changes(result, i) for i in range(len(result.problem.bases)))
-    return each if any(change.any() for change in each) else ()
+    return partial(whitener, line, firsts[0].sample_time_s, use, unread, problem.rows, changes=changes)
 
 
 def whitener(

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: free runs of what is believed, their errors, and effects with values and intervals."""
+"""Figures of a diagnosis: free runs of what is believed, and their errors where no fit has seen them."""
 
 from __future__ import annotations
 
@@ -10,36 +10,20 @@ from functools import cached_property
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.assemble import (
-    acquired_effects,
-    free_unknowns,
-    moments_in,
-    parameters_of,
-    profile_size,
-    profiles_of,
-    reported_covariance,
-    rms_of,
-)
-from estimator.diagnosis.inference.descent import descended
-from estimator.diagnosis.inference.disturbances import Size, reading_noise, whitener_of
-from estimator.diagnosis.inference.hypotheses import (
-    GRADE,
-    NOTHING,
-    THOROUGH,
-    Effects,
-    Hypothesis,
-    all_good_samples,
-)
-from estimator.diagnosis.inference.spread import beyond_the_line, with_secants
-from estimator.diagnosis.inference.trials import Standing, blocks
-from estimator.diagnosis.result import Evidence, Fit, FoundEffect, OutputFit, Trace
-from estimator.diagnosis.thresholds import Judging, Noise
+from estimator.diagnosis.acquisition.finding import AcquisitionFinding
+from estimator.diagnosis.inference.descent import THOROUGH, descended
+from estimator.diagnosis.inference.disturbances import reading_noise, whitener_of
+from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis
+from estimator.diagnosis.inference.trials import blocks
+from estimator.diagnosis.result import Estimated, Evidence, Fit, FoundEffect, OutputFit
+from estimator.diagnosis.thresholds import Intervals, Judging
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
 from estimator.physics.free_run import simulate_foreign
 from estimator.physics.model import DrivelineModel, unit
 from estimator.physics.problem import Problem, make_problem, parameters, start_vector
 from estimator.physics.unknowns import LocalBasis, Shared
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, by_output
 
 ITERATIONS = 8  # steps of a least-squares fit of what is a recording's own, which is nearly linear
@@ -145,39 +129,6 @@ class Unseen:
         return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
-def found_effect(standing: Standing, runs: FreeRuns) -> FoundEffect:
-    """Return an effect of the believed set with its values, from the fit that is reported."""
-    entry, model, best = EFFECTS[standing.name], runs.unseen.line, runs.believed.result
-    nulls = {parameter.name: parameter.null for parameter in entry.parameters}
-    profiles = {}
-    if standing.name == GRADE:
-        of = best.problem
-        problem = make_problem(model, of.records, of.shared, own=[b.own for b in of.local], profile=True, use=of.use)
-        course = fit(problem, warm_start(problem, best))
-        of_course = reported_covariance(course)
-        profiles, parameters = profiles_of(course, of_course, model), profile_size(course, of_course, model)
-    else:
-        parameters = parameters_of(standing.name, runs.estimate, runs.covariance, model)
-    p_value = max(math.exp(-0.5 * max(standing.evidence, 0.0)), Noise.SMALLEST_P)
-    return FoundEffect(
-        name=entry.name,
-        element=entry.element,
-        statement=entry.sentence(nulls | {name: p.value for name, p in parameters.items()}, model.motion),
-        parameters=parameters,
-        time_s=moments_in(standing.name, runs.estimate) if entry.event else {},
-        indistinguishable_from=tuple(standing.alike),
-        alternatives=standing.alike,
-        evidence=Evidence(standing.evidence, runs.held_before, runs.held_after, p_value),
-        profiles=profiles,
-        share=standing.share,
-        probability=standing.probability,
-        form=entry.form({name: p.value for name, p in parameters.items()}),
-        necessity=standing.necessity.value,
-        least_necessity=standing.necessity.least,
-        counted=standing.counted,
-    )
-
-
 @dataclass(frozen=True)
 class FreeRuns:
     """Free runs before and after, on the recordings at their own rate."""
@@ -209,29 +160,6 @@ class FreeRuns:
     def final(self) -> FitResult:
         """The nominal model with the effects believed: the recordings' first outputs."""
         return self.after.first_outputs()
-
-    @cached_property
-    def estimate(self) -> FitResult:
-        """The fit that values and intervals are taken from: of independent innovations, or of the free run."""
-        return replace(self.believed, result=self._errors).white if self.is_whole else self._errors
-
-    @cached_property
-    def covariance(self) -> FloatArray:
-        """Covariance of its scaled unknowns, shape (U, U): of correlated errors, and of disturbances that grow."""
-        free = free_unknowns(self.estimate)
-        fitted_s, period_s = (fit.problem.records[0].sample_time_s for fit in (self.believed.result, self._errors))
-        sizes = self.believed.sizes.copy()
-        sizes[Size.TORQUE] += 0.5 * math.log(fitted_s / period_s)  # of one sample, where these are closer together
-        return reported_covariance(self.estimate) + beyond_the_line(self._errors, self._weigh, sizes, free)
-
-    @cached_property
-    def _errors(self) -> FitResult:
-        """The same fit in its plain errors, its derivative over the width of the intervals."""
-        return with_secants(self.believed.result if self.is_whole else self.after, self._weigh)
-
-    def _weigh(self, errors: FloatArray) -> FloatArray:
-        """Return errors of the fit with a variance of 1."""
-        return self.believed.filter(errors) if self.is_whole else errors / self.after.rms
 
 
 def free_runs(nothing: Hypothesis, believed: Hypothesis, is_whole: bool, chain: Chain, unseen: Unseen) -> FreeRuns:
@@ -328,6 +256,46 @@ def figures_of(runs: FreeRuns, noise: float) -> Fit:
     )
 
 
+def acquired_effects(
+    findings: Sequence[AcquisitionFinding], before: Sequence[FloatArray], after: Sequence[FloatArray]
+) -> tuple[FoundEffect, ...]:
+    """Return what was recognised of the acquisition as effects."""
+    seen = [slice(int(0.7 * error.size), None) for error in after]
+    held = [rms_of([e[rows] for e, rows in zip(errors, seen, strict=True)]) for errors in (before, after)]
+    return tuple(
+        FoundEffect(
+            name=finding.name,
+            element=EFFECTS[finding.name].element,
+            statement=finding.statement,
+            parameters={name: Estimated(*sized) for name, sized in finding.parameters.items()},
+            time_s={},
+            indistinguishable_from=(),
+            evidence=Evidence(bic_gained(before, after), held[0], held[1], finding.p_value),
+        )
+        for finding in findings
+    )
+
+
+def bic_gained(before: Sequence[FloatArray], after: Sequence[FloatArray]) -> float:
+    """Return by how much one more unknown betters the information criterion of errors, for those of all recordings.
+
+    ``n_e ln(S_0/S_1) - ln n_e`` with the effective number of samples n_e of the errors ``after`` (Schwarz, Ann. Stat.
+    6, 1978).
+    """
+    n = max(effective_samples(after), Intervals.FEWEST_SAMPLES)
+    ratio = _squares(before) / max(_squares(after), np.finfo(float).tiny)
+    return n * math.log(max(ratio, 1.0)) - math.log(n)
+
+
+def _squares(errors: Sequence[FloatArray]) -> float:
+    return float(sum(error @ error for error in errors))
+
+
+def rms_of(errors: Sequence[FloatArray]) -> float:
+    """Return the RMS of the errors of several recordings together."""
+    return float(np.sqrt(_squares(errors) / sum(error.size for error in errors)))
+
+
 def _further(runs: FreeRuns) -> tuple[OutputFit, ...]:
     """Return the errors of the outputs beyond the first one, each in its own unit."""
     problem, found = runs.after.problem, []
@@ -345,31 +313,6 @@ def _rms(fit: FitResult, part: slice) -> float:
     rows = zip(fit.outputs[part], problem.records[part], problem.use[part], strict=True)
     errors = np.concatenate([(output - record.output)[use] for output, record, use in rows])
     return float(np.sqrt(np.mean(errors**2)))
-
-
-def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
-    """Return the simulations of every recording, for plots; those kept out of the fit last."""
-    line, kept_out, grid = runs.unseen.line, runs.unseen.chain.records, runs.retuned.problem.grid
-
-    def nominal(records: Sequence[Record]) -> tuple[FloatArray, ...]:
-        return fit(make_problem(line, records, (), grid=grid)).outputs
-
-    outputs = (nominal(runs.chain.records), runs.as_read.outputs, runs.chain.read(runs.final.outputs))
-    traces = [_trace(record, each, False) for record, *each in zip(runs.chain.raw, *outputs, strict=True)]
-    if kept_out:
-        use = all_good_samples(kept_out)
-        outputs = (
-            nominal(kept_out),
-            foreign_outputs(runs.retuned, line, kept_out, use, NOTHING),
-            foreign_outputs(runs.final, line, kept_out, use, runs.believed.effects),
-        )
-        traces += [_trace(record, each, True) for record, *each in zip(kept_out, *outputs, strict=True)]
-    return tuple(traces)
-
-
-def _trace(r: Record, runs: Sequence[FloatArray], holdout: bool) -> Trace:
-    nominal, retuned, augmented = runs
-    return Trace(r.name, r.time_s, r.torque_nm, r.output, r.okay, nominal, retuned, augmented, holdout)
 
 
 def refitted(hypothesis: Hypothesis, problem: Problem) -> FitResult:

@@ -10,18 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from threading import Lock
 
-from estimator.diagnosis.inference.checks import is_plausible, may_be_loose, widened
-from estimator.diagnosis.inference.descent import extended
+import numpy as np
+
+from estimator.diagnosis.inference.descent import compared, extended, fitted
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
-from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, compared, fitted
-from estimator.diagnosis.inference.score_tests import ScoredStart, promising
+from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, spans_of
+from estimator.diagnosis.inference.score_tests import Known, ScoredStart, WeightedScoreTests, promising
 from estimator.diagnosis.inference.trials import Trials
-from estimator.diagnosis.inference.weighted_score_tests import OutputChanges, WeightedScoreTests
 from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.noise import noise_floor
+from estimator.diagnosis.thresholds import Checks, Searching
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.fit import FitResult, not_fitted, warm_start
 from estimator.physics.layout import Grid, grid_for
@@ -30,6 +30,44 @@ from estimator.physics.parallel import Work
 from estimator.physics.problem import Problem, make_problem, start_vector
 from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
+
+ROOM_BYTES = 2**27  # room that answers may take
+
+
+@dataclass
+class OutputChanges:
+    """Changes of the output, by what was changed, around some motions."""
+
+    # A fit, and for each recording changes by digest of what was changed.
+    around: list[tuple[FitResult, list[Known]]] = field(default_factory=list)
+
+    def near(self, fit: FitResult) -> list[Known]:
+        """Return what is known around a motion that is nearly a fit's, by recording; empty where there is none."""
+        for other, known in self.around:
+            if _difference(fit, other) < Searching.SAME_MOTION:
+                return known
+        return [{} for _ in fit.problem.drives]
+
+    def learn(self, fit: FitResult, found: Sequence[Known]) -> None:
+        """Keep what was found around a fit; called in a fixed order: results depend on no number of cores."""
+        if self.is_full() or not any(found):
+            return
+        known = self.near(fit)
+        if not any(known is each for _, each in self.around):
+            self.around.append((fit, known))
+        for old, new in zip(known, found, strict=True):
+            old.update(new)
+
+    def is_full(self) -> bool:
+        """Tell whether the answers take all the room there is for them."""
+        each = (known for _, all_known in self.around for known in all_known)
+        return sum(len(known) * next(iter(known.values())).nbytes for known in each if known) > ROOM_BYTES
+
+
+def _difference(fit: FitResult, other: FitResult) -> float:
+    pairs = zip(fit.outputs, other.outputs, strict=True)
+    squares = sum(float(np.sum((mine - its) ** 2)) for mine, its in pairs)
+    return float(np.sqrt(squares / sum(float(np.sum((out - out.mean()) ** 2)) for out in fit.outputs)))
 
 
 @dataclass
@@ -59,30 +97,21 @@ class Fits:
     started_from: dict[Effects, Effects] = field(default_factory=dict)  # by set
     implausible: dict[str, float] = field(default_factory=dict)  # by effect
     foreseen: dict[str, float] = field(default_factory=dict)
+    limits: Limits = field(init=False)  # usual disturbances of these recordings, and their bounds
+    free: Limits = field(init=False)  # the same for a load that walks as far as it likes
+    catalogue: Catalogue = field(init=False)  # what sets are chosen among, with the odds that the model file gives
+    trials: Trials = field(init=False)  # the sets that were tried in free simulation
+    noise: float = field(init=False)  # of the reading, as its own past predicts it [unit of the output]
     _changes: OutputChanges = field(default_factory=OutputChanges)  # of the output, for score tests
     _done: set[tuple[str, Effects, str]] = field(default_factory=set)  # descents that need not be made again
     _lock: Lock = field(default_factory=Lock)  # sets are fitted in threads
 
-    @cached_property
-    def limits(self) -> Limits:
-        """Usual disturbances of these recordings and their bounds."""
-        return limits_of(self.records)
-
-    @cached_property
-    def catalogue(self) -> Catalogue:
-        """What sets are chosen among, with the odds that the model file gives."""
-        odds = {name: prior.odds for name, prior in self.model.priors.items() if prior.odds is not None}
-        return Catalogue(len(self.names), {name: value for name, value in odds.items() if name in self.names})
-
-    @cached_property
-    def trials(self) -> Trials:
-        """The sets that were tried in free simulation."""
-        return Trials(self.model)
-
-    @cached_property
-    def noise(self) -> float:
-        """The noise of the reading, as its own past predicts it: no law is in it [unit of the output]."""
-        return noise_floor(self.records)
+    def __post_init__(self) -> None:
+        self.limits, self.noise, self.trials = limits_of(self.records), noise_floor(self.records), Trials(self.model)
+        self.free = self.limits.freed()
+        given = {name: self.model.priors[name].odds for name in self.model.priors if name in self.names}
+        odds = {name: value for name, value in given.items() if value is not None}
+        self.catalogue = Catalogue(self.model, len(self.names), odds)
 
     @property
     def simulations(self) -> int:
@@ -93,7 +122,7 @@ class Fits:
         """Return the best score of a plausible set with each effect that was fitted, to its end or a few steps."""
         found: dict[str, float] = {}
         for each in (*self.ended.values(), *self.rough.values()):
-            for name in each.effects if self.is_plausible(each) else ():
+            for name in each.effects if each.is_plausible else ():
                 found[name] = min(each.score, found.get(name, math.inf))
         return found
 
@@ -111,7 +140,8 @@ class Fits:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
             initial = not_fitted(problem, start_vector(problem))
-            self._keep(fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue), NOTHING)
+            found = fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue)
+            self._keep(found, NOTHING)
         return self.ended[NOTHING]
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
@@ -154,11 +184,11 @@ class Fits:
             problem = self._extended(previous, effects, inheriting(name, scored.release, previous))
             initial = extended(problem, warm_start(problem, previous), current.result if is_again else rival.result)
             fits.append(self._compared(effects, initial, rival))
-        best = min([each for each in fits if self.is_plausible(each)] or fits, key=lambda each: each.score)
+        best = min([each for each in fits if each.is_plausible] or fits, key=lambda each: each.score)
         loose = widened(best, self.model)
         if loose is not None:
             best = self._more_plausible(best, self._compared(effects, loose, rival))
-        is_case = self.is_plausible(best)
+        is_case = best.is_plausible
         with self._lock:
             self.started_from.setdefault(effects, rival.effects)
             if not is_case:
@@ -207,12 +237,13 @@ class Fits:
             loose = widened(whole, self.model)
             if loose is not None:
                 whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
-            self._keep(whole if self.is_plausible(whole) else rough, rival.effects)
+            self._keep(whole if whole.is_plausible else rough, rival.effects)
         return self.ended[rough.effects]
 
     def view(self, around: Hypothesis) -> WeightedScoreTests:
         """Return the score tests around a fit, which know what was simulated around others like it."""
-        return WeightedScoreTests(around, self.model, self._changes)
+        known = self._changes.near(around.result)
+        return WeightedScoreTests(around, self.model, known)
 
     def learn(self, around: Hypothesis, view: WeightedScoreTests) -> None:
         """Keep what score tests simulated, for others like them."""
@@ -225,18 +256,9 @@ class Fits:
         self.learn(reduced, view)
         return found
 
-    def is_plausible(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether the values of every effect are a case of it."""
-        return is_plausible(hypothesis, self.model, self.records)
-
-    def is_resolved(self, hypothesis: Hypothesis, name: str) -> bool:
-        """Tell whether an effect is large enough to be distinguished from another way of sampling."""
-        values = hypothesis.result.values_of(name)
-        return name == GRADE or not EFFECTS[name].unresolved(self.model, self.records, values)
-
     def limits_of(self, effects: Effects) -> Limits:
         """Return the bounds of the disturbances under a set: a free course of the load has none."""
-        return self.limits.freed() if GRADE in effects else self.limits
+        return self.free if GRADE in effects else self.limits
 
     def _reduced(self, current: Hypothesis, name: str) -> FitResult:
         """Return the free run of a set without one of its effects, the rest as it is."""
@@ -252,7 +274,7 @@ class Fits:
 
     def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
         """Return the better of two fits of a set, where both are plausible; else the one that is."""
-        return other if self.is_plausible(other) and (other.score < one.score or not self.is_plausible(one)) else one
+        return other if other.is_plausible and (other.score < one.score or not one.is_plausible) else one
 
     def _extended(self, previous: FitResult, effects: Effects, release: Release) -> Problem:
         common = unknowns_of(previous, (effects - {GRADE}) | set(self.model.effects))
@@ -326,3 +348,29 @@ def unknowns_of(previous: FitResult, effects: Collection[str]) -> Release:
         tuple(unknown for unknown in previous.problem.shared if unknown.effect in wanted),
         tuple(tuple(unknown for unknown in basis.own if unknown.effect in wanted) for basis in previous.problem.local),
     )
+
+
+def widened(hypothesis: Hypothesis, model: DrivelineModel) -> FitResult | None:
+    """Return a fit whose nominal parameters may leave their tolerances where its effects change them; None as it is."""
+    result = hypothesis.result
+    wide = spans_of(hypothesis, model)
+    shared = tuple(
+        replace(each, low=each.low / Checks.LOOSE, high=each.high * Checks.LOOSE)
+        if pinned and not each.effect and each.name in wide and _is_tight(each, model)
+        else each
+        for each, pinned in zip(result.problem.shared, result.pinned, strict=False)
+    )
+    if shared == result.problem.shared:
+        return None
+    return replace(result, problem=replace(result.problem, shared=shared), converged=False)
+
+
+def may_be_loose(shared: Shared, effects: Effects, model: DrivelineModel) -> bool:
+    """Tell whether one of some effects changes a nominal parameter, so that it may leave its tolerance."""
+    line = model.values()
+    values = {name: dict.fromkeys((p.name for p in EFFECTS[name].parameters), 0.0) for name in effects - {GRADE}}
+    return any(shared.name in EFFECTS[name].described(model, mine, line) for name, mine in values.items())
+
+
+def _is_tight(shared: Shared, model: DrivelineModel) -> bool:
+    return shared.low < shared.high <= 1.0 + model.parameters[shared.name].tolerance + Checks.ROUNDING

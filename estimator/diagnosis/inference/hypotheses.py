@@ -1,4 +1,4 @@
-"""Hypotheses: sets of effects added to the nominal model, where their fits begin, and their likelihood."""
+"""Hypotheses: sets of effects added to the nominal model, their likelihood, and whether a machine can be so."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ from functools import cached_property
 
 import numpy as np
 
-from estimator.diagnosis.black_box import acts_around
-from estimator.diagnosis.inference.descent import Effort, descended, extended, without_derivative
+from estimator.diagnosis.black_box import BlackBox
 from estimator.diagnosis.inference.disturbances import (
     Limits,
+    Size,
     Whitener,
-    estimated,
     readings,
     whitener_of,
 )
-from estimator.diagnosis.inference.moments import has_moments, idle_moments, with_better_moments
-from estimator.diagnosis.thresholds import Fitting
+from estimator.diagnosis.line.line import line_values
+from estimator.diagnosis.thresholds import Checks
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Untestable
+from estimator.physics.effect import Effect, Element, Span, Untestable
 from estimator.physics.fit import FitResult
+from estimator.physics.inputs import shaft_torque
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.machine import out_of_question
 from estimator.physics.model import DrivelineModel, Motion
-from estimator.physics.motion import turns_on
+from estimator.physics.motion import longest_s, turns_on
 from estimator.physics.problem import bounds
+from estimator.physics.steps import has_edge
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 Effects = frozenset[str]
@@ -38,9 +39,6 @@ GRADE = "road_grade"
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the work behind it; raise from it to cancel."""
-
-THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
-"""What a pass may cost at most, and a first comparison."""
 
 
 def silent(_message: str, _share: float) -> None:
@@ -72,9 +70,33 @@ def open_hypotheses(model: DrivelineModel, records: Sequence[Record]) -> tuple[t
     return tuple(testable), untestable
 
 
+def acts_around(entry: Effect, plant: object) -> bool:
+    """Tell whether an effect acts at the inputs, shafts or outputs of a plant, whatever is inside it."""
+    if isinstance(plant, BlackBox) and entry.name in plant.laws:
+        return True
+    return entry.profile or entry.element in (Element.TORQUE_PATH, Element.SPEED_SENSOR, Element.ACQUISITION)
+
+
 def all_good_samples(records: Sequence[Record]) -> list[BoolArray]:
     """Return masks that use every good sample."""
     return [np.asarray(record.okay) for record in records]
+
+
+def idle_moments(result: FitResult) -> int:
+    """Return how many moments are of events that do not take place in their recording."""
+    count = 0
+    for i, basis in enumerate(result.problem.bases):
+        values = result.local_of(i)[basis.own_rows]
+        own = {(u.effect, u.name): (u, float(v)) for u, v in zip(basis.own, values, strict=True)}
+        for name in {u.effect for u in basis.own if EFFECTS[u.effect].event}:
+            (begin, from_s), (end, to_s) = own[name, "from_s"], own[name, "to_s"]
+            movable = (begin.low < begin.high) + (end.low < end.high)
+            if to_s <= from_s:
+                count += movable
+            else:  # one that begins or ends with the recording has no moment there
+                first, last = (float(t) for t in result.problem.records[i].since_start_s[[0, -1]])
+                count += (begin.low < begin.high and from_s <= first) + (end.low < end.high and to_s >= last)
+    return count
 
 
 @dataclass(frozen=True)
@@ -87,6 +109,7 @@ class Hypothesis:
     limits: Limits  # usual values and bounds of ``sizes``
     minus_twice_log: float  # minus twice the log-likelihood of the recordings, and of the disturbances' prior
     choices: float  # minus the logarithm of its prior probability (`Catalogue.choices`)
+    is_plausible: bool = True  # whether a machine can be so, and its values are a case of each effect
 
     @property
     def outputs(self) -> int:
@@ -124,6 +147,7 @@ class Hypothesis:
 class Catalogue:
     """What a set of effects is chosen among, and what is known of it before any recording is seen."""
 
+    model: DrivelineModel  # nominal
     effects: int  # how many these recordings can show
     odds: Mapping[str, float] = field(default_factory=dict)  # of those that the user has given odds, p / (1 - p)
 
@@ -139,74 +163,83 @@ class Catalogue:
         return usual - sum(math.log(max(self.odds[name], 1e-300)) for name in given)
 
 
-def fitted(
-    effects: Effects,
-    initial: FitResult,
-    sizes: FloatArray,
-    limits: Limits,
-    catalogue: Catalogue,
-    rival: float = math.nan,
+def hypothesis_of(
+    effects: Effects, result: FitResult, sizes: FloatArray, limits: Limits, minus_twice_log: float, catalogue: Catalogue
 ) -> Hypothesis:
-    """Fit a hypothesis from a free run and disturbances ``sizes``.
-
-    ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
-    less the last digits matter. Without one it is fitted to its end.
-    """
-    result, choices, sizes = initial, catalogue.choices(effects), np.clip(sizes, limits.low, limits.high)
-    best: Hypothesis | None = None
-    passes: list[float] = []
-    while best is None or len(passes) < Fitting.MOST_PASSES:
-        result = descended(result, whitener_of(result, sizes), THOROUGH)
-        if len(passes) < Fitting.WITH_MOMENTS:
-            result = _with_moments(result, sizes)
-        is_anew = not passes and math.isnan(rival)  # with a rival they begin where its own ended
-        sizes, now = estimated(result, result.residual, sizes, limits, Fitting.ROUNDS, is_anew)
-        enough = (
-            Fitting.SETTLED_DEVIANCE
-            if math.isnan(rival)
-            else max(Fitting.SETTLED_DEVIANCE, Fitting.DIGITS * abs(now - rival))
-        )
-        last = best is not None and now > best.minus_twice_log - enough
-        if best is None or now < best.minus_twice_log:
-            best = Hypothesis(effects, result, sizes, limits, now, choices)
-        if last:
-            break
-        passes.append(now)
-    return replace(best, result=without_derivative(best.result))
+    """Return a set that was fitted, with its prior and whether a machine can be so."""
+    found = Hypothesis(effects, result, sizes, limits, minus_twice_log, catalogue.choices(effects))
+    return replace(found, is_plausible=is_plausible(found, catalogue.model, result.problem.records))
 
 
-def compared(
-    effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, catalogue: Catalogue
-) -> Hypothesis:
-    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
-    result, choices, now = initial, catalogue.choices(effects), math.inf
-    sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
-    for _ in range(Fitting.MOST_ROUGH):
-        result = descended(result, whitener_of(result, sizes), ROUGH)
-        sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
-        if now > best - Fitting.MUCH * result.residual.size:
-            break
-        best = now
-    return Hypothesis(effects, result, sizes, limits, now, choices)
+def is_possible(hypothesis: Hypothesis, records: Sequence[Record]) -> bool:
+    """Tell whether a machine can be so: its input is on, it is not stuck, no load walks so far, events take place."""
+    values, result = _values_of(hypothesis), hypothesis.result
+    if GRADE in hypothesis.effects and _walk(hypothesis, records) > _most_torque(records):
+        return False
+    edges = all(has_edge(name, result) for name in values if EFFECTS[name].event)
+    return edges and _is_driven(result, records) and not _is_stuck(values, records)
 
 
-def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
-    """Return a fit with moments of events where the innovations are least, and fitted from there."""
-    if not has_moments(result.problem):
-        return result
-    for _ in range(2):
-        found = with_better_moments(result, whitener_of(result, sizes))
-        if found is None:
-            break
-        result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)
-    return result
+def is_plausible(hypothesis: Hypothesis, model: DrivelineModel, records: Sequence[Record]) -> bool:
+    """Tell whether a machine can be so, and the values of every effect are a case of it."""
+    values = _values_of(hypothesis)
+    if any(EFFECTS[name].implausible(model, records, values[name]) for name in values):
+        return False
+    return is_possible(hypothesis, records) and _is_described(hypothesis, model)
 
 
-def covariance(hypothesis: Hypothesis) -> FloatArray:
-    """Return the covariance of the scaled unknowns, shape (U, U): the inverse of the Fisher information."""
-    white = hypothesis.white
-    free = ~white.pinned
-    full = np.zeros((white.x.size, white.x.size))
-    j = white.jacobian[:, free]
-    full[np.ix_(free, free)] = np.linalg.pinv(j.T @ j, hermitian=True)
-    return full
+def _values_of(hypothesis: Hypothesis) -> dict[str, Mapping[str, float]]:
+    return {name: hypothesis.result.values_of(name) for name in hypothesis.effects - {GRADE}}
+
+
+def spans_of(hypothesis: Hypothesis, model: DrivelineModel) -> dict[str, list[Span]]:
+    """Return where data sheets' values of nominal parameters may lie that the effects change, by name."""
+    result, found = hypothesis.result, dict[str, list[Span]]()
+    line = line_values(result)
+    for name in hypothesis.effects - {GRADE}:
+        for parameter, spans in EFFECTS[name].described(model, result.values_of(name), line).items():
+            found.setdefault(parameter, []).extend(spans)
+    return found
+
+
+def _is_described(hypothesis: Hypothesis, model: DrivelineModel) -> bool:
+    """Tell whether every nominal value is, within its tolerance, one that the line had at some moment."""
+    spans_by_name, line = spans_of(hypothesis, model), line_values(hypothesis.result)
+    for name, spans in spans_by_name.items():
+        given = model.parameters[name]
+        low, high = (given.value * (1.0 + sign * (given.tolerance + Checks.ROUNDING)) for sign in (-1.0, 1.0))
+        if not any(first <= high and low <= last for first, last in [*spans, (line[name], line[name])]):
+            return False
+    return True
+
+
+def _is_driven(result: FitResult, records: Sequence[Record]) -> bool:
+    for i, record in enumerate(records):
+        through = shaft_torque(record.torque_nm, record.time_s - record.time_s[0], result.p_of(i))
+        for passed, read in zip(
+            np.array_split(through, Checks.PARTS), np.array_split(record.total_torque_nm, Checks.PARTS), strict=True
+        ):
+            if float(passed @ passed) < Checks.LEAST_THROUGH**2 * float(read @ read):
+                return False
+    return True
+
+
+def _walk(hypothesis: Hypothesis, records: Sequence[Record]) -> float:
+    """Return how far a load walks in the longest recording [Nm]."""
+    return float(np.exp(hypothesis.sizes[Size.WALK])) * math.sqrt(longest_s(records))
+
+
+def _most_torque(records: Sequence[Record]) -> float:
+    return max(float(np.abs(record.total_torque_nm).max()) for record in records)
+
+
+def _is_stuck(values: Mapping[str, Mapping[str, float]], records: Sequence[Record]) -> bool:
+    """Tell whether a torque against the motion is above all torque that was applied; where it swings it need not be."""
+    most = _most_torque(records)
+    return any(
+        values[name].get(parameter.name, 0.0) > most
+        for name in values
+        if EFFECTS[name].element in (Element.MOTOR, Element.LOAD) and not EFFECTS[name].swinging
+        for parameter in EFFECTS[name].parameters
+        if parameter.dimension == "torque" and parameter.null == 0.0  # that of a limit is beyond all torque
+    )

@@ -1,6 +1,6 @@
 """Moves: from one set of effects to the next, by an effect added, dropped, begun elsewhere or exchanged.
 
-Each move returns the sets that it leads to, fitted; which of them is taken is the search's (`search.py`). Effects are
+Each move returns the sets that it leads to, fitted; `better_than` takes the first of them that is better. Effects are
 not fitted in turn: a score test around the present fit says what each one promises, and the most promising are fitted a
 few steps, the best of these to their end.
 """
@@ -14,8 +14,7 @@ import numpy as np
 
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses
-from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, promising
-from estimator.diagnosis.inference.weighted_score_tests import WeightedScoreTests
+from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, WeightedScoreTests, promising
 from estimator.diagnosis.priors import EffectPriors
 from estimator.diagnosis.thresholds import Searching
 from estimator.physics.catalogue import EFFECTS
@@ -31,6 +30,31 @@ from estimator.physics.unknowns import Release
 BLIND = "speed_sign_blind"
 
 Starts = Mapping[str, Sequence[ScoredStart]]
+
+
+def better_than(fits: Fits, current: Hypothesis) -> Hypothesis | None:
+    """Return the set that a search goes to from one; None where no move leads to a better one."""
+    again = _most_probable(fits, begun_elsewhere(fits, current), current)
+    if again is not None:
+        return again
+    is_done = fits.trials.leaves_a_trace_at_most(current, fits.nothing(), fits.noise)
+    may_grow = len(current.effects) < Searching.MOST_EFFECTS and not is_done
+    larger = additions(fits, current) if may_grow else []
+    larger = [each for each in larger if fits.trials.is_worth_adding(each, current)]
+    if (grown := _most_probable(fits, larger, current)) is not None:
+        return grown
+    smaller = drops(fits, current)
+    return (
+        _most_probable(fits, smaller, current)
+        or fits.trials.as_good(smaller, current)
+        or _most_probable(fits, exchanges(fits, current), current)
+        or _most_probable(fits, with_free_load(fits, current), current)
+    )
+
+
+def _most_probable(fits: Fits, found: Sequence[Hypothesis], current: Hypothesis) -> Hypothesis | None:
+    better = [each for each in found if each.score < current.score and each.is_plausible]
+    return min(better, key=lambda each: each.score, default=None)
 
 
 def additions(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
@@ -64,7 +88,7 @@ def begun_elsewhere(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
             found += fits.rewritten(current, name)
             if EFFECTS[name].event:
                 found.append(fits.elsewhere(current, name))
-    better = [each for each in found if each is not None and fits.is_plausible(each)]
+    better = [each for each in found if each is not None and each.is_plausible]
     return [fits.finish(min(better, key=lambda each: each.score), current)] if better else []
 
 

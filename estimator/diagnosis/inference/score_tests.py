@@ -8,6 +8,8 @@ from functools import partial
 
 import numpy as np
 
+from estimator.diagnosis.inference.disturbances import Whitener
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from estimator.diagnosis.thresholds import Searching
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import Case
@@ -33,6 +35,10 @@ from estimator.signals.record import FloatArray, Record
 
 ROOM_SAMPLES = 2**21
 """Samples that are simulated in one call at most, in whole starts: side by side they take less time, and more room."""
+
+
+Known = dict[bytes, FloatArray]
+"""Changes of a recording's output, by a digest of the parameters that were changed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,15 +107,10 @@ class Screen:
         self._projector = projector or Projector(result)
         self._rows = result.problem.rows
 
-    def starts(self, name: str, kept: str = "") -> list[ScoredStart]:
-        """Return a look at each start of an effect, the most promising first.
-
-        ``kept`` is a parameter that keeps the value of the fit that is looked around, in every start.
-        """
+    def starts(self, name: str) -> list[ScoredStart]:
+        """Return a look at each start of an effect, the most promising first."""
         entry = EFFECTS[name]
         releases = effect_unknowns(name, self._model, self._result.problem.records)
-        if kept:
-            releases = [self._keeping(kept, release) for release in releases]
         if entry.profile:
             return [ScoredStart(release, np.inf) for release in releases]
         looker = self._periodic if entry.phases else self._events if entry.event else self._plain
@@ -134,13 +135,6 @@ class Screen:
             starts = [self._along(steps, step, change) for step, change in zip(steps.sizes, moved, strict=True)]
             found.append(max(starts, key=lambda scored: scored.promise))
         return sorted(found, key=lambda scored: -scored.promise)
-
-    def _keeping(self, kept: str, release: Release) -> Release:
-        p = self._result.p
-        return replace(
-            release,
-            shared=tuple(replace(u, start=p[u.slot] / u.scale) if u.name == kept else u for u in release.shared),
-        )
 
     def _plain(self, entry: Effect, releases: Sequence[Release]) -> list[ScoredStart]:
         found = []
@@ -294,6 +288,53 @@ class Screen:
         for rows, part in zip(self._rows, parts, strict=True):
             whole[..., rows] = part
         return whole
+
+
+class _Weighted(Projector):
+    """Takes signals as the simulation gives them, and weighs them as a hypothesis does."""
+
+    def __init__(self, hypothesis: Hypothesis) -> None:
+        super().__init__(hypothesis.white)
+        self._filter: Whitener = hypothesis.filter
+
+    def products(self, answers: FloatArray, index: int) -> tuple[FloatArray, FloatArray]:
+        return super().products(self._filter.part(index, answers.T).T, index)
+
+    def promise(self, direction: FloatArray, low: float, high: float) -> tuple[float, float]:
+        white = self._filter(direction)
+        return super().promise(white, low, high) if np.isfinite(white @ white) else (0.0, 0.0)
+
+
+class WeightedScoreTests(Screen):
+    """Looks at effects around a hypothesis, with what was simulated around others of the same motion.
+
+    To which answer an output comes when a law is added depends on the motion, and hardly on how the errors are weighed.
+    So what one hypothesis has simulated will do for the next, and only the weighing is its own.
+    """
+
+    def __init__(self, hypothesis: Hypothesis, model: DrivelineModel, known: Sequence[Known]) -> None:
+        super().__init__(hypothesis.white, model, _Weighted(hypothesis))
+        self._known = known
+        self.found: list[Known] = [{} for _ in self._known]
+
+    def _runner(self, index: int) -> Simulate:
+        simulate, known, found_here = super()._runner(index), self._known[index], self.found[index]
+        nominal, still = self._result.p_of(index), self._output(index)
+
+        def run(parameters: Sequence[FloatArray], alike_s: FloatArray | None = None) -> FloatArray:
+            keys = [_changed(nominal, p) for p in parameters]
+            if all(key in known for key in keys):
+                return np.array([still + known[key] for key in keys])
+            found = simulate(parameters, alike_s)
+            found_here.update((key, (out - still).astype(np.float32)) for key, out in zip(keys, found, strict=True))
+            return found
+
+        return run
+
+
+def _changed(nominal: FloatArray, p: FloatArray) -> bytes:
+    places = np.flatnonzero(p != nominal)
+    return places.tobytes() + p[places].tobytes()
 
 
 def _filled(p: FloatArray, shared: tuple[Shared, ...]) -> FloatArray:

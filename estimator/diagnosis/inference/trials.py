@@ -71,6 +71,7 @@ class Necessity:
 
     value: float  # estimate, as a share of 1
     least: float  # lower end of its one-sided 95 % interval, by the scatter of the blocks
+    counted: Counted  # how many names of such a lower end were there
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,16 +85,6 @@ class Standing:
     alike: Mapping[str, Mapping[str, float]]  # effects that explain as much in its place, with their values there
     objection: str = ""  # why it is not established; "" where it is
     slight: str = ""  # why it is a trace though established; "" where it is a name
-
-    @property
-    def counted(self) -> Counted:
-        """How many names of such a necessity were there."""
-        return next((count for least, count in reversed(COUNTED) if self.necessity.least >= least), COUNTED[0][1])
-
-    @property
-    def probability(self) -> float:
-        """Probability that this effect, or one that it can't be distinguished from, is there."""
-        return self.counted.probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,10 +148,16 @@ def necessity(whole: Trial, without: Trial, noise: float) -> Necessity:
     left, before = whole.excess(noise), without.excess(noise)
     total = float(before.sum())
     if total <= 0.0 or float(left.sum()) >= total:
-        return Necessity(0.0, 0.0)
+        return Necessity(0.0, 0.0, counted_from(0.0))
     ratio = max(float(left.sum()), 0.0) / total
     scatter = math.sqrt(left.size) * float(np.std(left - ratio * before, ddof=1)) / total if left.size > 1 else math.inf
-    return Necessity(1.0 - ratio, max(1.0 - ratio - quantile(left.size) * scatter, 0.0))
+    least = max(1.0 - ratio - quantile(left.size) * scatter, 0.0)
+    return Necessity(1.0 - ratio, least, counted_from(least))
+
+
+def counted_from(least: float) -> Counted:
+    """Return how many names whose necessity had such a lower end were there."""
+    return next((count for begin, count in reversed(COUNTED) if least >= begin), COUNTED[0][1])
 
 
 @dataclass
@@ -198,6 +195,27 @@ class Trials:
         one, other = self.of([smaller, larger])
         needed = necessity(other, one, noise_of(larger))
         return needed.value >= Searching.WORTH_ADDING and needed.least > 0.0
+
+    def leaves_a_trace_at_most(self, current: Hypothesis, nothing: Hypothesis, noise: float) -> bool:
+        """Tell whether what a set leaves beyond a noise is so little that no further law could be more than a trace."""
+        if not current.effects:
+            return False
+        without, its = self.one(nothing), self.one(current)
+        return float(its.excess(noise).sum()) < Judging.LEAST_SHARE * float(without.excess(noise).sum())
+
+    def as_good(self, smaller: Sequence[Hypothesis], whole: Hypothesis) -> Hypothesis | None:
+        """Return the set of fewer laws that simulates as well as the whole one, the best of several."""
+        if not smaller:
+            return None
+        best = self.one(whole)
+        found = [each for each in self.of(smaller) if each.beats(best) and each.hypothesis.is_plausible]
+        return min(found, key=lambda each: each.rms).hypothesis if found else None
+
+    def worth_beginning_from(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return the sets of which none clearly leaves so much more than the best that no search need begin there."""
+        trials = self.of(hypotheses)
+        best = min(trials, key=lambda each: each.rms)
+        return [each.hypothesis for each in trials if not each.is_far_behind(best)]
 
     def _is_new(self, hypothesis: Hypothesis) -> bool:
         known = self._tried.get(hypothesis.effects)

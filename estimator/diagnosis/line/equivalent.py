@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -42,47 +41,26 @@ DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Ele
 """Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
 
 
-class InputPlace(Enum):
-    """Where an unknown input may act: on the motor, in the shaft, against the load, on the reading."""
+INPUTS = (Element.MOTOR, Element.SHAFT, Element.LOAD, Element.SPEED_SENSOR)
+"""Where an unknown input may act: on the motor, in the shaft, against the load, on the reading."""
 
-    MOTOR = "motor"
-    SHAFT = "shaft"
-    LOAD = "load"
-    SENSOR = "sensor"
+ACTS_AT = {Element.TORQUE_PATH: Element.MOTOR, Element.ACQUISITION: Element.SPEED_SENSOR}
+"""Where a law of an element acts, if not there: an input alone does not distinguish those that act at one place."""
 
 
-PLACES = {
-    Element.TORQUE_PATH: InputPlace.MOTOR,
-    Element.MOTOR: InputPlace.MOTOR,
-    Element.SHAFT: InputPlace.SHAFT,
-    Element.LOAD: InputPlace.LOAD,
-    Element.SPEED_SENSOR: InputPlace.SENSOR,
-    Element.ACQUISITION: InputPlace.SENSOR,
-}
-"""Where a law of an element acts."""
-
-ELEMENTS = {
-    InputPlace.MOTOR: Element.MOTOR,
-    InputPlace.SHAFT: Element.SHAFT,
-    InputPlace.LOAD: Element.LOAD,
-    InputPlace.SENSOR: Element.SPEED_SENSOR,
-}
-"""The element that a place is reported as: an input alone does not distinguish those that act there."""
-
-
-def places(result: FitResult) -> tuple[InputPlace, ...]:
+def places(result: FitResult) -> tuple[Element, ...]:
     """Return the places at which an unknown input may act on a line of this structure."""
     if result.problem.grid.structure is Structure.JOINT:
-        return (InputPlace.SHAFT,)
+        return (Element.SHAFT,)
     if result.problem.grid.structure is Structure.ONE_MASS:
-        return (InputPlace.MOTOR, InputPlace.SENSOR)
-    return tuple(InputPlace)
+        return (Element.MOTOR, Element.SPEED_SENSOR)
+    return INPUTS
 
 
-def size_at(result: FitResult, place: InputPlace) -> float:
+def size_at(result: FitResult, place: Element) -> float:
     """Return the usual size of an input at a place: a torque [Nm], or a speed [rad/s] at the sensor."""
     records = result.problem.records
-    return speed_scale(records) if place is InputPlace.SENSOR else torque_scale(records)
+    return speed_scale(records) if place is Element.SPEED_SENSOR else torque_scale(records)
 
 
 class Filtered(NamedTuple):
@@ -238,13 +216,13 @@ class Input:
 class Explanation:
     """The inputs at one place, one per recording."""
 
-    place: InputPlace  # where they act
+    place: Element  # of `INPUTS`, where they act
     inputs: tuple[Input, ...]  # in the order of the recordings
     rate: float  # standard deviation of the walk's change in one second [unit of the input]
     log_likelihood: float  # of the error, at the best rate
 
 
-def explain(result: FitResult, place: InputPlace, floor: float) -> Explanation:
+def explain(result: FitResult, place: Element, floor: float) -> Explanation:
     """Estimate the input at one place that explains a fit's error, each recording's in turn."""
     problem, size = result.problem, size_at(result, place)
     errors = [record.output - output for record, output in zip(problem.records, result.outputs, strict=True)]
@@ -264,7 +242,7 @@ def explain(result: FitResult, place: InputPlace, floor: float) -> Explanation:
     return Explanation(place, smoothed(result, errors, problem.use, place, rate, floor), rate, -float(best.fun))
 
 
-def explain_all(result: FitResult, floor: float) -> dict[InputPlace, Explanation]:
+def explain_all(result: FitResult, floor: float) -> dict[Element, Explanation]:
     """Estimate the input at every place; the compiled passes hold no interpreter lock and run side by side."""
     wanted = places(result)
     return dict(zip(wanted, concurrently(lambda place: explain(result, place, floor), wanted), strict=True))
@@ -274,7 +252,7 @@ def smoothed(
     result: FitResult,
     errors: Sequence[FloatArray],
     use: Sequence[BoolArray],
-    place: InputPlace,
+    place: Element,
     rate: float,
     floor: float,
 ) -> tuple[Input, ...]:
@@ -298,14 +276,14 @@ class Chain(NamedTuple):
     prior: FloatArray  # (n + 1, n + 1): covariance of their first values
 
 
-def _chain(result: FitResult, place: InputPlace, rate: float, floor: float) -> Chain:
+def _chain(result: FitResult, place: Element, rate: float, floor: float) -> Chain:
     line, period_s, size = line_of(result), result.problem.records[0].sample_time_s, size_at(result, place)
-    n, is_sensor = line.torque.size, place is InputPlace.SENSOR
+    n, is_sensor = line.torque.size, place is Element.SPEED_SENSOR
     f, h, prior = np.zeros((n + 1, n + 1)), np.zeros(n + 1), np.zeros((n + 1, n + 1))
-    f[:n, :n], f[n, n] = line.f, np.exp(-period_s / FORGETS_S) if place is InputPlace.SHAFT else 1.0
+    f[:n, :n], f[n, n] = line.f, np.exp(-period_s / FORGETS_S) if place is Element.SHAFT else 1.0
     h[:n], h[n] = line.h[0], 1.0 if is_sensor else line.direct
     if not is_sensor:  # with an error of the reading the line itself is as simulated
-        f[:n, n] = {InputPlace.MOTOR: line.torque, InputPlace.LOAD: line.load, InputPlace.SHAFT: line.shaft}[place]
+        f[:n, n] = {Element.MOTOR: line.torque, Element.LOAD: line.load, Element.SHAFT: line.shaft}[place]
         prior[np.arange(n), np.arange(n)] = (INITIAL_SPREAD * _scales(result, line)) ** 2
     prior[n, n] = size**2
     return Chain(f, h, rate**2 * period_s, floor**2, prior)

@@ -164,6 +164,12 @@ def form_changes(result: FitResult, index: int) -> FloatArray:
     return _of_laws(result, index, change_around)
 
 
+def changes_of(result: FitResult) -> tuple[FloatArray, ...]:
+    """Return how much laws change in each recording at each place, shape (3, N_i); nothing where none does."""
+    each = tuple(form_changes(result, i) for i in range(len(result.problem.bases)))
+    return each if any(change.any() for change in each) else ()
+
+
 def form_shifts(result: FitResult, index: int) -> FloatArray:
     """Return what is missing at each place around a change of a law that comes late [Nm], shape (3, N)."""
     return _of_laws(result, index, change_across)

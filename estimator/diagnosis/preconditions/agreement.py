@@ -14,9 +14,9 @@ from statistics import median
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.inference.wording import times
 from estimator.diagnosis.result import Doubt
 from estimator.diagnosis.thresholds import Mistakes
+from estimator.diagnosis.wording import times
 from estimator.errors import EstimatorError
 from estimator.identification.best import band_of
 from estimator.identification.modes.modes import Uncertain

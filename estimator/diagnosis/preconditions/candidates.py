@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from estimator.diagnosis.preconditions.channels import dead_rows
-from estimator.diagnosis.preconditions.inertia import bridged, lag_of
+from estimator.diagnosis.preconditions.inertia import Measured, bridged
 from estimator.diagnosis.priors import MistakePriors
 from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import Cure
@@ -156,22 +156,26 @@ class Change:
     is_of_one: bool = False  # whether it can only be so in one of several
     is_open: bool = False  # it may be physics as well, so that it is doubted and not refused
 
+    def undone_in(self, record: Record) -> Record:
+        """Return a recording with it undone."""
+        return record if self.of_record is None else self.of_record(record)
 
-def changes_of(records: Sequence[Record], line: Line, ratio: float, off: Record) -> Iterator[Change]:
-    """Yield nothing, then all that may be wrong beyond a factor; ``ratio`` is the inertia's in a recording ``off``."""
-    period_s = records[0].sample_time_s
+
+def changes_of(seen: Measured, line: Line) -> Iterator[Change]:
+    """Yield nothing, then all that may be wrong beyond a factor in what was measured."""
+    records, period_s = seen.records, seen.records[0].sample_time_s
     yield Change(
         prior=1.0 if Mistakes.FASTEST_S <= period_s <= Mistakes.SLOWEST_S else MistakePriors.UNLIKELY, factors=2
     )
     if records[0].imposed is None:
         yield from _of_inputs(records[0], line)
         if line is not None:
-            yield from of_one_unit(off, ratio)
+            yield from of_one_unit(records[seen.off], seen.ratio)
         yield from _of_columns(records[0])
     yield from _of_time(records)
     if line is not None:
-        yield from _of_shifts(records, line)
-        yield from _of_model(line, abs(ratio))
+        yield from _of_shifts(records[0].kind.value, seen.lags_s)
+        yield from _of_model(line, abs(seen.ratio))
         yield from _of_physics(records, line)
 
 
@@ -229,7 +233,7 @@ def of_one_unit(record: Record, ratio: float) -> Iterator[Change]:
     for i in range(count if count > 1 and ratio != 1.0 else 0):
         share = float(record.torque_nm[:, i] @ total) / (float(total @ total) or 1.0)
         factor = float(f"{(1.0 / ratio - 1.0 + share) / (share or 1.0):.2g}")
-        is_thousand = factor > 0.0 and abs(abs(math.log10(factor)) - 3.0) < 0.1
+        is_thousand = factor > 0.0 and abs(abs(math.log10(factor)) - Mistakes.DECADES) < Mistakes.DECADES_OFF
         if not (Mistakes.OF_ONE[0] < factor < Mistakes.OF_ONE[1] or is_thousand):
             continue
         at = np.where(np.arange(count) == i, factor, 1.0)
@@ -268,13 +272,12 @@ def _of_time(records: Sequence[Record]) -> Iterator[Change]:
             yield Change(question, prior, timed, cure=cure, may_be_alone=factor in TIME_UNITS)
 
 
-def _of_shifts(records: Sequence[Record], line: DrivelineModel) -> Iterator[Change]:
+def _of_shifts(output: str, lags_s: Sequence[float]) -> Iterator[Change]:
     """Yield that the output lags behind, or leads, the torque, by what the recordings show."""
-    lags = {lag for record in records if (lag := lag_of(record, line)) is not None}
-    for lag_s in sorted(lag for lag in lags if abs(lag) >= Mistakes.LEAST_SHIFT_S):
+    for lag_s in (lag for lag in lags_s if abs(lag) >= Mistakes.LEAST_SHIFT_S):
         side = "late" if lag_s > 0.0 else "early"
         question = (
-            f"is the {records[0].kind.value} {abs(lag_s):.3g} s {side} against the torque: a shift between columns, or "
+            f"is the {output} {abs(lag_s):.3g} s {side} against the torque: a shift between columns, or "
             "a delay of that length"
         )
         yield Change(question, 0.1, partial(_shifted, lag_s=lag_s), is_open=True)
@@ -319,11 +322,6 @@ def _of_physics(records: Sequence[Record], line: DrivelineModel) -> Iterator[Cha
 
 def _scaled(by: FloatArray) -> Callable[[Record], Record]:
     return lambda record: replace(record, torque_nm=record.torque_nm * by)
-
-
-def times(torque: float, output: float) -> Callable[[Record], Record]:
-    """Return the transform that multiplies all torques, and the output."""
-    return lambda each: replace(each, torque_nm=each.torque_nm * torque, output=each.output * output)
 
 
 def _swapped(record: Record, i: int) -> Record:

@@ -11,10 +11,11 @@ import numpy as np
 
 from estimator.diagnosis.acquisition.finding import runs
 from estimator.diagnosis.thresholds import Channels, Recordings
+from estimator.errors import NotExciting
 from estimator.physics.motion import measured_speed
 from estimator.signals.record import BoolArray, Channel, FloatArray, IntArray, Location, OutputKind, Record
 
-TURN = 2.0 * math.pi
+TURN = math.tau
 
 
 def period_of(values: FloatArray, seen: BoolArray) -> float | None:
@@ -357,3 +358,35 @@ def without_not_read(records: Sequence[Record]) -> tuple[list[Record], list[str]
             )
         corrected.append(record if np.array_equal(okay, record.okay) else replace(record, okay=okay))
     return corrected, warnings
+
+
+def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Return recordings unwrapped and without what no sensor has read, and a warning for each change."""
+    warnings: list[str] = []
+    corrected = list(records)
+    for correct in (unwrapped, without_clipped, without_not_read, with_usable_channels):
+        corrected, notes = correct(corrected)
+        warnings += notes
+    return corrected, warnings
+
+
+def require_signals(record: Record) -> None:
+    """Refuse a recording with too few good samples, or of which torque or output does not change."""
+    good = int(record.okay.sum())
+    if good < Recordings.FEWEST_SAMPLES:
+        raise NotExciting(
+            f"recording {record.name}: {good} good samples, expected at least {Recordings.FEWEST_SAMPLES}. Record "
+            "longer.",
+            (record.name,),
+        )
+    driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
+    still = standstill(record)
+    for what, values in (driven_by, ("output", record.output)):
+        seen = values[record.okay]
+        if not still and float(np.ptp(seen)) == 0.0:
+            still = (
+                f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
+                "Excite the driveline (PRBS, reversal, tip-in) and check the channel."
+            )
+    if still:
+        raise NotExciting(still, (record.name,))

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import detrend
 
-from estimator.diagnosis.noise import noise_floor
-from estimator.diagnosis.preconditions.channels import standstill
-from estimator.diagnosis.thresholds import Inertias, Recordings
-from estimator.errors import BadModel, NotExciting
+from estimator.diagnosis.thresholds import Inertias, Mistakes
+from estimator.errors import BadModel
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import Grid, flat, grid_for
 from estimator.physics.model import DrivelineModel, Parameter, Structure, natural_frequencies_rad_s
 from estimator.physics.motion import measured_speed, turns_on
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, Record
-
-UNREAD = ", and that every torque is read: what another one does counts as noise."
 
 BODY = DrivelineModel(Structure.ONE_MASS, {"J_M": Parameter(1.0, 0.0), "b_M": Parameter(0.0, 0.0)})
 """What any line is as a whole, where no model is known; its inertia says nothing."""
@@ -40,35 +36,6 @@ def driven(record: Record, line: DrivelineModel, grid: Grid, from_hz: float = 0.
         torque = np.fft.irfft(spectrum, torque.size)
     alone = replace(record, torque_nm=torque[:, np.newaxis], load_nm=None, torque_okay=None, offset_s=None)
     return simulate(grid, alone, flat(line), InitialCondition(0.0, 0.0, 0.0))
-
-
-def model_warnings(model: DrivelineModel) -> list[str]:
-    """Return what is odd about a model's values, one sentence each; values that can't be are refused by the model."""
-    values = model.values()
-    damping = _damping(values) if model.structure is Structure.TWO_MASS else []
-    return [*_inertias({name: value for name, value in values.items() if name.startswith("J")}), *damping]
-
-
-def _inertias(values: Mapping[str, float]) -> list[str]:
-    small, large = min(values, key=values.__getitem__, default=""), max(values, key=values.__getitem__, default="")
-    if small == large or values[large] < Inertias.UNEQUAL * values[small]:
-        return []
-    return [
-        f"model: {small} = {values[small]:g} and {large} = {values[large]:g} differ by a factor of "
-        f"{values[large] / values[small]:.3g}; the smaller one can hardly be seen. Are both reflected to the motor "
-        "shaft and in the same unit?"
-    ]
-
-
-def _damping(values: Mapping[str, float]) -> list[str]:
-    first = float(natural_frequencies_rad_s(values)[0])
-    ratio = 0.5 * values["c"] * first / values["k"]  # of the relative motion of two masses: 2 zeta w_0 = c w_0^2 / k
-    if ratio < 1.0:
-        return []
-    return [
-        f"model: with c = {values['c']:g} and k = {values['k']:g} the first mode ({first / (2.0 * math.pi):.3g} Hz) is "
-        f"damped {ratio:.3g} times critically: the line does not oscillate. Are k and c in the right unit and order?"
-    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +107,7 @@ def _grid_or_none(record: Record, line: DrivelineModel) -> Grid | None:
         return None
 
 
-def lag_of(record: Record, line: DrivelineModel) -> float | None:
+def _lag_of(record: Record, line: DrivelineModel) -> float | None:
     """Return by how much the output is late against the nominal answer to the torque [s]; None where nothing tells."""
     grid = _grid_or_none(record, line)
     if grid is None or record.imposed is not None:
@@ -152,7 +119,7 @@ def lag_of(record: Record, line: DrivelineModel) -> float | None:
     if first_hz > 0.0:  # where the mode rings, any whole period of it fits
         together[np.fft.rfftfreq(2 * record.okay.size - 2, record.sample_time_s) > Inertias.BELOW[1] * first_hz] = 0.0
     likeness = np.fft.irfft(together)
-    most = min(round(Inertias.LONGEST_LAG_S / record.sample_time_s), likeness.size // 4)
+    most = min(round(Inertias.LONGEST_LAG_S / record.sample_time_s), likeness.size // Inertias.LAG_SHARE)
     lags = np.arange(-most, most + 1)
     best = int(lags[np.argmax(likeness[lags])])
     return best * record.sample_time_s if abs(best) < most else None
@@ -276,88 +243,6 @@ def _rest(y: FloatArray, design: FloatArray) -> FloatArray:
     return y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
 
 
-def require_signals(record: Record) -> None:
-    """Refuse a recording with too few good samples, or of which torque or output does not change."""
-    good = int(record.okay.sum())
-    if good < Recordings.FEWEST_SAMPLES:
-        raise NotExciting(
-            f"recording {record.name}: {good} good samples, expected at least {Recordings.FEWEST_SAMPLES}. Record "
-            "longer.",
-            (record.name,),
-        )
-    driven_by = ("torque", record.total_torque_nm) if record.imposed is None else ("imposed motion", record.imposed)
-    still = standstill(record)
-    for what, values in (driven_by, ("output", record.output)):
-        seen = values[record.okay]
-        if not still and float(np.ptp(seen)) == 0.0:
-            still = (
-                f"recording {record.name}: the {what} is constant at {seen[0]:g}, expected it to vary. "
-                "Excite the driveline (PRBS, reversal, tip-in) and check the channel."
-            )
-    if still:
-        raise NotExciting(still, (record.name,))
-
-
-def require_excitation(records: Sequence[Record], model: DrivelineModel) -> list[str]:
-    """Refuse recordings in which nothing moves beyond the noise; warn where only a part of the model is excited.
-
-    What the torque does to the output is asked of the nominal model. A part of it that stays below the noise of the
-    reading is not excited: whatever is fitted there is fitted to noise.
-    """
-    floor = noise_floor(records)
-    moved = _rms([_good(record, record.output) for record in records])
-    excited = math.sqrt(max(moved**2 - floor**2, 0.0))
-    unit = records[0].kind.value
-    if excited < floor:
-        raise NotExciting(
-            f"the {unit} moves by {excited:.3g} (rms) beyond a noise of {floor:.3g}, expected more than the noise. "
-            f"Excite the driveline (PRBS, reversal, tip-in){UNREAD}",
-            tuple(record.name for record in records),
-        )
-    if records[0].imposed is not None:  # no torque that could be too small
-        return []
-    line = replace(model, effects={})
-    grid = grid_for(line, records)
-    answer = _rms([_good(record, driven(record, line, grid)) for record in records])
-    if answer < floor:
-        raise NotExciting(
-            f"by the nominal model the torque moves the {unit} by {answer:.3g} (rms), less than its noise of "
-            f"{floor:.3g}: the torque read excites nothing. Excite the driveline (PRBS, reversal, tip-in), check that "
-            f"the torque is in Nm (force: N){UNREAD}",
-            tuple(record.name for record in records),
-        )
-    return _unexcited_mode(records, line, grid, floor)
-
-
-def _unexcited_mode(records: Sequence[Record], line: DrivelineModel, grid: Grid, floor: float) -> list[str]:
-    first_hz = float(natural_frequencies_rad_s(line.values())[0]) / (2.0 * math.pi)
-    if first_hz == 0.0:
-        return []
-    lacking = "stiffness, damping and effects of the shaft can't be determined from these recordings"
-    nyquist_hz = 0.5 / records[0].sample_time_s
-    if nyquist_hz < first_hz:
-        return [
-            f"the model's first mode is at {first_hz:.3g} Hz, beyond the {nyquist_hz:.3g} Hz that a sampling period of "
-            f"{records[0].sample_time_s:g} s can show: {lacking}. Sample faster, or use structure = 'one_mass'."
-        ]
-    answer = _rms([_good(record, driven(record, line, grid, Recordings.NEAR_MODE * first_hz)) for record in records])
-    if answer >= floor:
-        return []
-    return [
-        f"at and above the model's first mode ({first_hz:.3g} Hz) the torque moves the {records[0].kind.value} by "
-        f"{answer:.3g} (rms), less than its noise of {floor:.3g}: {lacking}. Superpose a PRBS, or a tip-in."
-    ]
-
-
-def _good(record: Record, signal: FloatArray) -> FloatArray:
-    """Return a signal's good samples without mean and trend."""
-    return detrend(signal[record.okay])
-
-
-def _rms(signals: Sequence[FloatArray]) -> float:
-    return math.sqrt(sum(float(signal @ signal) for signal in signals) / sum(signal.size for signal in signals))
-
-
 def tolerance_of(line: DrivelineModel) -> float:
     """Return the tolerance of the nominal inertia; of a line without one, the largest tolerance."""
     inertias = [each.tolerance for name, each in line.parameters.items() if name.startswith("J")]
@@ -369,11 +254,61 @@ def is_within_tolerance(found: Inertia, line: DrivelineModel) -> bool:
     return found.tells and 1.0 - tolerance_of(line) <= found.ratio <= 1.0 + tolerance_of(line)
 
 
-def ratio_off(found: Sequence[Inertia], line: DrivelineModel | None) -> tuple[float, int]:
-    """Return the middle one of the inertias' ratios beyond their tolerance, and of which recording; 1 of the first."""
-    off = [
-        (each.ratio, i)
-        for i, each in enumerate(found)
-        if each.tells and line is not None and not is_within_tolerance(each, line)
+def _less_friction(records: Sequence[Record], found: Sequence[Inertia], line: DrivelineModel) -> list[Inertia]:
+    """Return what recordings fit, those that tell nothing as what friction explains: it is no fault of theirs."""
+    return [
+        each if each.tells else held_by_friction(record, line) or each
+        for record, each in zip(records, found, strict=True)
     ]
-    return sorted(off)[len(off) // 2] if off else (1.0, 0)
+
+
+def _is_suspicious(found: Sequence[Inertia], line: DrivelineModel) -> bool:
+    """Tell whether an inertia is off, differs between the bands, or from one recording to the other."""
+    counted = [math.log(abs(each.ratio)) for each in found if each.tells]
+    return (
+        any(not each.tells or not is_within_tolerance(each, line) for each in found)
+        or any(abs(each.log_ratio) > Mistakes.BANDS_BEYOND for each in found)
+        or (bool(counted) and max(counted) - min(counted) > Mistakes.LEAST_LOG_RATIO)
+    )
+
+
+def is_plausible(found: Inertia, line: DrivelineModel) -> bool:
+    """Tell whether an inertia is within reach of re-tuning, or of physics missing."""
+    tolerance = tolerance_of(line)
+    return (1.0 - tolerance) / Mistakes.BEYOND <= found.ratio <= (1.0 + tolerance) * Mistakes.BEYOND
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What recordings show that do not fit their line; without a line, what they show by themselves."""
+
+    records: tuple[Record, ...]  # those long enough to tell
+    found: tuple[Inertia, ...]  # what each of them fits
+    ratio: float = 1.0  # the middle one of those beyond their tolerance; 1 where none is
+    off: int = 0  # which recording that is of
+    lags_s: tuple[float, ...] = ()  # by how much outputs are late against the torque, each once
+    is_off: bool = False  # whether one is beyond what re-tuning, or missing physics, would make of it
+    is_right: bool = False  # whether one is within its tolerance
+
+
+def measured(records: Sequence[Record], line: DrivelineModel | None) -> Measured | None:
+    """Return what recordings show that do not fit a line; None where they fit, and where none of them tells."""
+    fits = [(record, fitted_inertia(record, line or BODY)) for record in records]
+    # one that is too short for its line says nothing: a period that makes it longer would explain more of nothing
+    long = [(record, each) for record, each in fits if line is None or not math.isnan(each.ratio)]
+    kept, found = tuple(record for record, _ in long), tuple(each for _, each in long)
+    if line is None or not long:
+        return Measured(kept, found) if long else None
+    if not _is_suspicious(_less_friction(kept, found, line), line):
+        return None
+    off = sorted((f.ratio, i) for i, f in enumerate(found) if f.tells and not is_within_tolerance(f, line))
+    ratio, at = off[len(off) // 2] if off else (1.0, 0)
+    return Measured(
+        kept,
+        found,
+        ratio,
+        at,
+        tuple(sorted({lag for record in kept if (lag := _lag_of(record, line)) is not None})),
+        is_off=any(each.tells and not is_plausible(each, line) for each in found),
+        is_right=any(is_within_tolerance(each, line) for each in found),
+    )

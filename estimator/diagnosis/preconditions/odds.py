@@ -17,8 +17,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.diagnosis.preconditions.candidates import Change, Line, Part, Row, changes_of, rows_for, times
-from estimator.diagnosis.preconditions.inertia import BODY, Inertia, fitted_inertia, ratio_off, tolerance_of
+from estimator.diagnosis.preconditions.candidates import (
+    Change,
+    Line,
+    Part,
+    Row,
+    changes_of,
+    of_one_unit,
+    rows_for,
+)
+from estimator.diagnosis.preconditions.inertia import BODY, Inertia, Measured, fitted_inertia, measured, tolerance_of
 from estimator.diagnosis.priors import MistakePriors
 from estimator.diagnosis.thresholds import Inertias, Mistakes
 from estimator.errors import Cure
@@ -49,6 +57,21 @@ class Candidate:
             self.change.question or self.is_turned or any(row.whole for row, _ in self.rows)
         )
 
+    @property
+    def may_be_physics(self) -> bool:
+        """Whether missing physics, or another payload in one recording, may look the same."""
+        return self.is_a_factor or self.change.is_open or self.only is not None
+
+    @property
+    def may_be_refused(self) -> bool:
+        """Whether it is wrong in all recordings, and by a known size.
+
+        A scale of any size may be physics, too, such as gravity: it is doubted, as an inertia next to another mistake.
+        """
+        open_parts = {Part.TORQUE, Part.OUTPUT} | ({Part.MODEL} if self.change.question else set())
+        is_of_any_size = any(row.low < row.high and not row.whole and row.part in open_parts for row, _ in self.rows)
+        return self.only is None and not self.change.is_open and not is_of_any_size
+
     def cure(self, record: Record) -> Cure | None:
         """Return what to correct; None where that is not known, or the model, or one recording alone, is to be.
 
@@ -74,8 +97,9 @@ class Candidate:
     def undone(self, records: Sequence[Record]) -> list[Record]:
         """Return the recordings with it undone."""
         torque, output = self.factors()
-        by = times(torque, -output if self.is_turned else output)
-        return [by(changed_by(record, self.change)) for record in records]
+        output *= -1.0 if self.is_turned else 1.0
+        read = (self.change.undone_in(record) for record in records)
+        return [replace(each, torque_nm=each.torque_nm * torque, output=each.output * output) for each in read]
 
     def question(self, records: Sequence[Record], falls: str) -> str:
         """Say it as a question."""
@@ -88,11 +112,67 @@ class Candidate:
         return said + (f", in {records[self.only].name} alone" if self.only is not None else "") + "?"
 
 
-def with_odds(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -> list[tuple[Candidate, float]]:
+Ranked = Sequence[tuple[Candidate, float]]
+"""Candidates with their odds, the likeliest first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What is doubtful of recordings that do not fit their line."""
+
+    seen: Measured  # the recordings, and what they fit
+    best: Candidate  # what most likely explains it
+    ranked: Ranked  # all that would
+    is_right: float  # odds that nothing is wrong
+    is_refused: bool  # whether only a mistake explains it, surely enough to fit nothing
+    cure: Cure | None = None  # the line that cures it; none where that is not known, or not clear
+
+
+def judged(records: Sequence[Record], line: Line, is_tried: bool = False) -> Judgement | None:
+    """Return what is doubtful of recordings of one drive; None where nothing is.
+
+    With ``is_tried`` they are asked with a cure applied, and none is looked for.
+    """
+    seen = measured(records, line)
+    if seen is None:
+        return None
+    ranked = _ranked(seen, line)
+    (best, odds), others = ranked[0], [each for each in ranked[1:] if not each[0].is_right]
+    is_right = math.fsum(each for candidate, each in ranked if candidate.is_right)
+    is_clear = odds >= Mistakes.LIKELY and not (best.is_right or best.is_else)
+    if best.is_right or is_right >= Mistakes.DOUBTFUL or (line is None and not is_clear):
+        return None
+    if best.is_else and not seen.is_off:  # a road, a brake or a driver moved the line
+        return None
+    cure = None
+    if is_clear and not is_tried and odds >= Mistakes.OVER_THE_NEXT * max((each for _, each in others), default=0.0):
+        cure = best.cure(seen.records[0])
+        if cure is not None and not _passes(best, seen, line):
+            cure = None
+    is_wrong = 1.0 - is_right - math.fsum(each for candidate, each in ranked if candidate.is_else)
+    is_sure = odds >= Mistakes.SURELY if seen.is_right else is_clear
+    is_certain = is_wrong >= Mistakes.SURELY and (seen.is_off or (is_sure and not best.may_be_physics))
+    return Judgement(seen, best, ranked, is_right, is_certain and best.may_be_refused, cure)
+
+
+def _passes(best: Candidate, seen: Measured, line: Line) -> bool:
+    """Tell whether with a candidate undone the table finds nothing, and no input alone in a unit explains more."""
+    undone = best.undone(seen.records)
+    if judged(undone, line, is_tried=True) is not None:
+        return False
+    if line is None or not best.is_a_factor or all(row.low == row.high for row, _ in best.rows):
+        return True
+    rest = sum(fitted_inertia(record, line).rest for record in undone)
+    of_one = of_one_unit(seen.records[0], seen.ratio)
+    return all(sum(fitted_inertia(each.undone_in(r), line).rest for r in seen.records) > rest for each in of_one)
+
+
+def _ranked(seen: Measured, line: Line) -> Ranked:
     """Return all candidates with their odds, the likeliest first."""
+    records, found = seen.records, seen.found
     sizes = [largest(record) for record in records]
     is_whole = all(are_whole_numbers(record) for record in records)
-    rows = rows_for(line, records[0].kind, is_whole)
+    rows, changes = rows_for(line, records[0].kind, is_whole), changes_of(seen, line)
     spread = 0.0 if line is None else MistakePriors.CLOSE[0] * math.log1p(tolerance_of(line))
     off = _log_near(MistakePriors.OFFSETS, max(spread, 0.5 * MistakePriors.CLOSE[1]), MistakePriors.PHYSICS_SHARE)
     off = off - np.logaddexp.reduce(off)
@@ -109,9 +189,8 @@ def with_odds(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -
         for each, size, record, other in zip(found, sizes, records, unknown, strict=True)
     ]
     all_of = [Candidate(Change(), log_weight=math.log(MistakePriors.ELSE) + sum(unknown), is_else=True)]
-    ratio, off_in = ratio_off(found, line)
-    for change in changes_of(records, line, ratio, records[off_in]):
-        changed = [changed_by(record, change) for record in records]
+    for change in changes:
+        changed = [change.undone_in(record) for record in records]
         its_line = line if line is None or change.of_line is None else change.of_line(line)
         fits = found if not change.question else [fitted_inertia(each, its_line or BODY) for each in changed]
         if not change.question:  # what moves a line besides its torque is no fault of a recording
@@ -125,7 +204,7 @@ def with_odds(records: Sequence[Record], line: Line, found: Sequence[Inertia]) -
     return _once(sorted(found_odds, key=lambda pair: -pair[1]), records)
 
 
-def _once(ranked: Sequence[tuple[Candidate, float]], records: Sequence[Record]) -> list[tuple[Candidate, float]]:
+def _once(ranked: Ranked, records: Sequence[Record]) -> Ranked:
     """Return candidates of the same words as one, with the odds of all of them."""
     kept: dict[str, tuple[Candidate, float]] = {}
     for candidate, odds in ranked:
@@ -274,11 +353,6 @@ def are_whole_numbers(record: Record) -> bool:
     return (
         bool(np.abs(read - np.round(read)).max() <= Mistakes.WHOLE) and np.unique(read).size >= Mistakes.FEWEST_VALUES
     )
-
-
-def changed_by(record: Record, change: Change) -> Record:
-    """Return a recording with a change undone in it."""
-    return record if change.of_record is None else change.of_record(record)
 
 
 def _rough(value: float) -> str:

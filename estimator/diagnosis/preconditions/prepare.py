@@ -8,23 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import without_lost_samples
-from estimator.diagnosis.preconditions.agreement import disagreements
 from estimator.diagnosis.preconditions.channels import (
-    unwrapped,
-    with_usable_channels,
-    without_clipped,
-    without_not_read,
+    require_signals,
+    with_motion_corrected,
 )
-from estimator.diagnosis.preconditions.inertia import model_warnings, require_excitation, require_signals
-from estimator.diagnosis.preconditions.plausible import doubts_about
+from estimator.diagnosis.preconditions.excitation import model_warnings, require_excitation
+from estimator.diagnosis.preconditions.plausible import doubtful
 from estimator.diagnosis.result import Diagnosis, Doubt
-from estimator.diagnosis.segments import Cut, cut, joined, segments, shortened_to_memory, thinned
+from estimator.diagnosis.segments import Cut, cut, joined, shortened_to_memory, thinned
 from estimator.diagnosis.thresholds import Mistakes
 from estimator.errors import BadShape, NotExciting, made_of_each
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp
 from estimator.physics.simulate import output_state
-from estimator.signals.record import Record, separated_outputs, sliced
+from estimator.signals.record import Record, separated_outputs
 
 
 def require_together(records: Sequence[Record]) -> None:
@@ -67,34 +64,6 @@ class Prepared:
         """Return a diagnosis of these records under the recordings' own names, with their warnings."""
         whole = joined(diagnosis, self.segments)
         return replace(whole, warnings=(*self.warnings, *whole.warnings))
-
-
-def with_motion_corrected(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Return recordings unwrapped and without what no sensor has read, and a warning for each change."""
-    warnings: list[str] = []
-    corrected = list(records)
-    for correct in (unwrapped, without_clipped, without_not_read, with_usable_channels):
-        corrected, notes = correct(corrected)
-        warnings += notes
-    return corrected, warnings
-
-
-def doubtful(records: Sequence[Record], model: DrivelineModel | None) -> list[Doubt]:
-    """Ask of recordings as they were read whether they can be of one drive, and of a model where there is one.
-
-    The longest stretch of each is asked; where units and signs leave no doubt, also whether they are of one line.
-    Raises `Implausible` where they can't be of a drive.
-    """
-    corrected, _ = with_motion_corrected(records)
-    thin_ones = corrected if model is None else thinned(corrected, model)
-    doubts = doubts_about(without_lost_samples([_longest(record) for record in thin_ones]), model)
-    if doubts or model is None:
-        return doubts
-    return disagreements(without_lost_samples([_longest(record) for record in corrected]), model)
-
-
-def _longest(record: Record) -> Record:
-    return sliced(record, max(segments(record), key=lambda rows: int(record.okay[rows].sum())))
 
 
 def prepare(records: Sequence[Record], model: DrivelineModel, holdout: Sequence[Record] = ()) -> Prepared:

@@ -1,4 +1,4 @@
-"""Discrepancy between model and recordings as the report draws it."""
+"""What the report draws: simulations of every recording, and where and how model and recordings differ."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.covariance import Z95
+from estimator.diagnosis.inference.figures import FreeRuns, foreign_outputs
+from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.line.equivalent import (
+    ACTS_AT,
     DRIVES,
-    ELEMENTS,
-    PLACES,
     Explanation,
-    InputPlace,
     explain,
     explain_all,
     smoothed,
 )
 from estimator.diagnosis.line.line import Motion, motion_of
-from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture
+from estimator.diagnosis.result import Course, Discrepancy, Equivalent, LawPicture, Trace
 from estimator.diagnosis.thresholds import Noise, Places
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics import model
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element
-from estimator.physics.fit import FitResult
+from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import slot
 from estimator.physics.model import Motion as Kind, unit
-from estimator.physics.problem import outputs_at
+from estimator.physics.problem import make_problem, outputs_at
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 
@@ -86,9 +86,9 @@ def signal_unit(dimension: str, kind: Kind) -> str:
     return f"{unit('speed', kind)}/s" if dimension == "speed/s" else unit(dimension, kind)
 
 
-def input_unit(place: InputPlace, result: FitResult, kind: Kind) -> str:
+def input_unit(place: Element, result: FitResult, kind: Kind) -> str:
     """Return the unit of an unknown input at a place; at the sensor that of the output."""
-    if place is not InputPlace.SENSOR:
+    if place is not Element.SPEED_SENSOR:
         return unit("torque", kind)
     names = {"speed": "speed", "position": "angle", "force": "torque"}
     return unit(names[result.problem.records[0].kind.value], kind)
@@ -161,7 +161,7 @@ def picture(
     kind: Kind,
 ) -> LawPicture | None:
     """Return a law over its own variable, or else over what it is most nearly a function of; None without either."""
-    place = PLACES[element]
+    place = ACTS_AT.get(element, element)
     found = explain(without, place, floor)
     sign = DRIVES.get(element, 1.0)
     data = [sign * each.value for each in found.inputs]
@@ -188,18 +188,45 @@ def _sums(first: Sequence[FloatArray], second: Sequence[FloatArray]) -> list[Flo
     return [a + b for a, b in zip(first, second, strict=True)]
 
 
+def courses_of(runs: FreeRuns) -> tuple[Trace, ...]:
+    """Return the simulations of every recording, for plots; those kept out of the fit last."""
+    line, kept_out, grid = runs.unseen.line, runs.unseen.chain.records, runs.retuned.problem.grid
+
+    def nominal(records: Sequence[Record]) -> tuple[FloatArray, ...]:
+        return fit(make_problem(line, records, (), grid=grid)).outputs
+
+    outputs = (nominal(runs.chain.records), runs.as_read.outputs, runs.chain.read(runs.final.outputs))
+    traces = [_trace(record, each, False) for record, *each in zip(runs.chain.raw, *outputs, strict=True)]
+    if kept_out:
+        use = all_good_samples(kept_out)
+        outputs = (
+            nominal(kept_out),
+            foreign_outputs(runs.retuned, line, kept_out, use, NOTHING),
+            foreign_outputs(runs.final, line, kept_out, use, runs.believed.effects),
+        )
+        traces += [_trace(record, each, True) for record, *each in zip(kept_out, *outputs, strict=True)]
+    return tuple(traces)
+
+
+def _trace(r: Record, runs: Sequence[FloatArray], holdout: bool) -> Trace:
+    nominal, retuned, augmented = runs
+    return Trace(r.name, r.time_s, r.torque_nm, r.output, r.okay, nominal, retuned, augmented, holdout)
+
+
 def discrepancy(
     retuned: FitResult, final: FitResult, floor: float, motion: model.Motion = model.Motion.ROTATION
 ) -> Discrepancy:
     """Look at what a re-tuned model lacks, with the effects found."""
     inputs = explain_all(retuned, floor)
+    motions = [motion_of(final, i, is_between=True) for i in range(len(final.problem.records))]
+    spectrum, by_recording = error_spectrum(retuned, final, floor), responses(retuned, final)
     likeliest = max(inputs.values(), key=lambda each: each.log_likelihood)
     return Discrepancy(
-        element=ELEMENTS[likeliest.place],
+        element=likeliest.place,
         equivalents=_equivalents(retuned, inputs, likeliest.log_likelihood, motion),
-        spectrum=error_spectrum(retuned, final, floor),
-        responses=responses(retuned, final),
-        pictures=_pictures_of_effects(effects_added(retuned, final), final, floor, motion),
+        spectrum=spectrum,
+        responses=by_recording,
+        pictures=_pictures_of_effects(effects_added(retuned, final), final, motions, floor, motion),
     )
 
 
@@ -212,13 +239,13 @@ def effects_added(retuned: FitResult, final: FitResult) -> tuple[str, ...]:
 
 def _equivalents(
     retuned: FitResult,
-    inputs: Mapping[InputPlace, Explanation],
+    inputs: Mapping[Element, Explanation],
     most: float,
     motion: model.Motion,
 ) -> tuple[Equivalent, ...]:
     return tuple(
         Equivalent(
-            place.value,
+            "sensor" if place is Element.SPEED_SENSOR else place.value,
             input_unit(place, retuned, motion),
             _courses(retuned.problem.records, explanation),
             explanation.log_likelihood,
@@ -236,9 +263,8 @@ def _courses(records: Sequence[Record], explanation: Explanation) -> Mapping[str
 
 
 def _pictures_of_effects(
-    named: Sequence[str], final: FitResult, floor: float, motion: model.Motion
+    named: Sequence[str], final: FitResult, motions: Sequence[Motion], floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
-    motions = [motion_of(final, i, is_between=True) for i in range(len(final.problem.records))]
     drawn = [
         picture(name, EFFECTS[name].element, without_effect(final, name), final.outputs, motions, floor, motion)
         for name in named

@@ -12,10 +12,10 @@ from estimator.diagnosis.inference.decide import Decision, Rival, decide, no_riv
 from estimator.diagnosis.inference.figures import Unseen
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
-from estimator.diagnosis.inference.say import Basis, said
 from estimator.diagnosis.inference.search import Search, search_from_nothing
 from estimator.diagnosis.result import Diagnosis, Effort
-from estimator.diagnosis.table_answer import unnamed_law
+from estimator.diagnosis.say import Basis, said
+from estimator.diagnosis.tables import unnamed_law
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import DrivelineModel

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.wording import times
 from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.diagnosis.wording import times
 
 NUMBER = r"(-?[\d.]+(?:e[+-]?\d+)?)"
 

@@ -9,16 +9,10 @@ import pytest
 
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.acquisition.finding import AcquisitionFinding, Sized
-from estimator.diagnosis.assemble import (
-    acquired_effects,
-    augmented_model,
-    moments_in,
-    parameters_of,
-    profiles_of,
-    reported_covariance,
-    retuned_parameters,
-)
+from estimator.diagnosis.assemble import augmented_model, moments_in, parameters_of, profiles_of, retuned_parameters
+from estimator.diagnosis.covariance import reported_covariance
 from estimator.diagnosis.diagnose import diagnose
+from estimator.diagnosis.inference.figures import acquired_effects
 from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.result import Evidence, FoundEffect
 from estimator.physics.catalogue import EFFECTS, effect_problems

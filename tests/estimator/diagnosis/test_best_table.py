@@ -7,8 +7,9 @@ import pytest
 
 from estimator.diagnosis.inference.disturbances import Limits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
+from estimator.diagnosis.table_curves import curve_through
 from estimator.diagnosis.table_words import looks_like, shortest_formula
-from estimator.diagnosis.tables import best_table, table_at, widened_by_jackknife
+from estimator.diagnosis.tables import best_table, widened_by_jackknife
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.simulate import simulate
@@ -81,10 +82,10 @@ def test_a_line_that_lacks_nothing_gets_no_law() -> None:
 
 def test_the_free_form_of_a_place_fits_all_samples() -> None:
     hypothesis = retuned(recorded({"quadratic_friction": {"quadratic_nm_s2": 0.4}}))
-    free = table_at(hypothesis, "motor_speed")
+    free = curve_through(hypothesis.result.first_outputs(), "motor_speed")
     assert free is not None
     assert free.chosen_by < 0.5 * hypothesis.result.rms
-    assert table_at(hypothesis, "load_angle") is None
+    assert curve_through(hypothesis.result.first_outputs(), "load_angle") is None
 
 
 def test_a_curve_is_fitted_next_to_a_limit_that_is_infinite() -> None:
@@ -96,7 +97,7 @@ def test_a_curve_is_fitted_next_to_a_limit_that_is_infinite() -> None:
     result = replace(
         hypothesis.result, problem=replace(problem, shared=(*problem.shared, unlimited)), x=np.insert(x, first, np.inf)
     )
-    free = table_at(replace(hypothesis, result=result), "motor_speed")
+    free = curve_through(result.first_outputs(), "motor_speed")
     assert free is not None
     assert free.chosen_by < 0.5 * hypothesis.result.rms
 

@@ -9,15 +9,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimator.diagnosis.assemble import (
-    Z95,
-    bic_gained,
-    covariance,
-    interval,
-    interval_that_follows,
-    reported_covariance,
-)
-from estimator.diagnosis.noise import noise_floor, unpredictable
+from estimator.diagnosis.assemble import interval, interval_that_follows
+from estimator.diagnosis.covariance import Z95, covariance, reported_covariance
+from estimator.diagnosis.inference.figures import bic_gained
+from estimator.diagnosis.inference.remainder import unpredictable
+from estimator.diagnosis.noise import noise_floor
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.fit import FitResult
 from estimator.signals.correlation import effective_samples

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Fit, Slight, Verdict
+from estimator.diagnosis.wording import Context, statement
 
 
 def test_a_trace_says_what_it_does_to_the_values() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis import diagnose
 from estimator.diagnosis.preconditions.channels import clipped, not_read, unwrapped, without_clipped, without_not_read
-from estimator.diagnosis.preconditions.inertia import model_warnings, require_excitation
+from estimator.diagnosis.preconditions.excitation import model_warnings, require_excitation
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Verdict
 from estimator.diagnosis.thresholds import Recordings

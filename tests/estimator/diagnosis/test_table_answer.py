@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from estimator.diagnosis.table_answer import Law
+from estimator.diagnosis.tables import Law
 from estimator.physics.driveline import Structure
 from estimator.physics.model import DrivelineModel, Parameter
 from estimator.physics.tables import Table
@@ -34,7 +34,7 @@ def test_a_value_that_a_law_moves_out_of_its_interval_widens_it() -> None:
     unused: Any = None
     fitted: Any = Fitted({"J_L": 139.0, "J_M": 3.9, "k": 7700.0})
     found: Any = Found()
-    law = Law(unused, found, fitted, unused)
+    law = Law(unused, found, fitted, unused, unused, "")
     after = law.augmented(DrivelineModel(Structure.TWO_MASS, LINE)).parameters
     assert (after["J_L"].value, after["J_L"].ci95) == (139.0, (92.7, 139.0))
     assert (after["J_M"].value, after["J_M"].ci95) == (3.9, (3.0, 4.5))

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.assemble import load_torques, reported_covariance
+from estimator.diagnosis.assemble import load_torques
+from estimator.diagnosis.covariance import reported_covariance
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.errors import BadModel
 from estimator.physics.driveline import Case, InitialCondition

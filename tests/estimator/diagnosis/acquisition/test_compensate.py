@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.diagnosis.acquisition.chain import as_read, compensate, recognise
+from estimator.diagnosis.acquisition.chain import as_read, clock_of, compensate, fill, recognise
 from estimator.diagnosis.acquisition.finding import OUTPUT
-from estimator.diagnosis.acquisition.stale import clock_of, fill
 from estimator.signals.record import BoolArray, FloatArray, Record
 from tests.estimator.diagnosis.acquisition.bench import (
     KINDS,

@@ -9,7 +9,8 @@ import pytest
 
 from estimator.diagnosis.acquisition.chain import recognise
 from estimator.diagnosis.acquisition.finding import OUTPUT, AcquisitionFinding
-from estimator.diagnosis.acquisition.quantised import chance_repeats, lattice_step
+from estimator.diagnosis.acquisition.quantised import lattice_step
+from estimator.diagnosis.acquisition.stale import chance_repeats
 from estimator.signals.record import BoolArray, Record
 from tests.estimator.diagnosis.acquisition.bench import healthy, random_rows, stale
 

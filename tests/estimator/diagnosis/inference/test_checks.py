@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from estimator.diagnosis.inference.checks import is_plausible, widened
 from estimator.diagnosis.inference.disturbances import Limits, limits_for
-from estimator.diagnosis.inference.hypotheses import Hypothesis
+from estimator.diagnosis.inference.fits import widened
+from estimator.diagnosis.inference.hypotheses import Hypothesis, is_plausible
 from estimator.diagnosis.thresholds import Checks
 from estimator.physics.fit import FitResult, not_fitted
 from estimator.physics.problem import make_problem, start_vector

@@ -11,8 +11,8 @@ from estimator.diagnosis.diagnose import diagnose
 from estimator.diagnosis.inference.decide import free_line
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
-from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Effort, Fit, OffNominal, Verdict
+from estimator.diagnosis.wording import Context, statement
 from estimator.physics.effect import Element
 from estimator.physics.model import DrivelineModel
 from tests.estimator.diagnosis.planted import quiet

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.assemble import free_unknowns
-from estimator.diagnosis.inference.hypotheses import Hypothesis, covariance
-from estimator.diagnosis.inference.spread import beyond_the_line, with_secants
+from estimator.diagnosis.covariance import beyond_the_line, free_unknowns, with_secants
+from estimator.diagnosis.inference.descent import covariance_of_innovations
+from estimator.diagnosis.inference.hypotheses import Hypothesis
 from tests.estimator.diagnosis.one_effect import Bench, bench_with, searched
 from tests.estimator.physics.bench import TWO_MASS
 
@@ -39,7 +39,8 @@ def spreads(of: Hypothesis) -> tuple[np.ndarray, np.ndarray]:
     drawn = replace(of, result=result)
     added = beyond_the_line(result, of.filter, of.sizes, free_unknowns(drawn.white))
     count = len(result.problem.shared)
-    return np.sqrt(np.diag(covariance(of)))[:count], np.sqrt(np.diag(covariance(drawn) + added))[:count]
+    along, beyond = covariance_of_innovations(of), covariance_of_innovations(drawn) + added
+    return np.sqrt(np.diag(along))[:count], np.sqrt(np.diag(beyond))[:count]
 
 
 def test_where_faces_meet_a_value_is_known_less_well_than_the_slope_at_a_point_says(

@@ -3,7 +3,7 @@
 import pytest
 
 from estimator.diagnosis.inference import trials
-from estimator.diagnosis.inference.trials import COUNTED, Necessity, Standing
+from estimator.diagnosis.inference.trials import COUNTED, counted_from
 from estimator.diagnosis.result import Counted
 
 
@@ -21,7 +21,7 @@ def test_a_probability_is_what_a_count_shows_of_the_next_and_never_above_the_sha
 
 def test_a_name_is_counted_among_those_that_are_needed_as_surely(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trials, "COUNTED", [(0.0, Counted(1, 2)), (0.7, Counted(8, 10)), (0.9, Counted(20, 20))])
-    found = [Standing("lag", Necessity(1.0, least), 0.9, 100.0, {}).counted.right for least in (0.5, 0.7, 0.89, 0.95)]
+    found = [counted_from(least).right for least in (0.5, 0.7, 0.89, 0.95)]
     assert found == [1, 8, 8, 20]
 
 

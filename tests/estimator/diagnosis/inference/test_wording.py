@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 
 from estimator.diagnosis.inference.decide import verdict_of
-from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import Counted, Effort, Evidence, Fit, FoundEffect, Remainder, Verdict
+from estimator.diagnosis.wording import Context, statement
 from estimator.physics.catalogue import title_of
 from estimator.physics.effect import Element
 

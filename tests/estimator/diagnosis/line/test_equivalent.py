@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from estimator.diagnosis.line.equivalent import Filtered, InputPlace, explain, run_filter, run_smoother
+from estimator.diagnosis.line.equivalent import Filtered, explain, run_filter, run_smoother
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
@@ -69,15 +69,15 @@ def nominal(element: Element, size: float) -> FitResult:
 
 
 PLANTED = [
-    (Element.TORQUE_PATH, InputPlace.MOTOR, 20.0),
-    (Element.SHAFT, InputPlace.SHAFT, 40.0),
-    (Element.LOAD, InputPlace.LOAD, 20.0),
-    (Element.SPEED_SENSOR, InputPlace.SENSOR, 0.3),
+    (Element.TORQUE_PATH, Element.MOTOR, 20.0),
+    (Element.SHAFT, Element.SHAFT, 40.0),
+    (Element.LOAD, Element.LOAD, 20.0),
+    (Element.SPEED_SENSOR, Element.SPEED_SENSOR, 0.3),
 ]
 
 
 @pytest.mark.parametrize(("element", "place", "size"), PLANTED, ids=[p.value for _, p, _ in PLANTED])
-def test_a_planted_input_is_found_within_its_band(element: Element, place: InputPlace, size: float) -> None:
+def test_a_planted_input_is_found_within_its_band(element: Element, place: Element, size: float) -> None:
     """But for its mean: a constant torque is the constant load's, a constant twist is invisible."""
     result = nominal(element, size)
     (first, _) = explain(result, place, SIGMA).inputs
@@ -86,6 +86,6 @@ def test_a_planted_input_is_found_within_its_band(element: Element, place: Input
     apart = first.value - planted
     apart -= np.median(apart)
     assert np.mean(np.abs(apart) <= 1.96 * first.std) > 0.9
-    assert np.std(apart) < (0.6 if place is InputPlace.SHAFT else 0.4) * np.std(
+    assert np.std(apart) < (0.6 if place is Element.SHAFT else 0.4) * np.std(
         planted
     )  # the shaft's slow part is invisible

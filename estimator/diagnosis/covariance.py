@@ -1,4 +1,7 @@
-"""How far disturbances move the values of a model whose laws switch: what its intervals are made from.
+"""How well values are known: their covariance, of errors that are correlated and of laws that switch.
+
+The intervals hold although the errors are correlated (`covariance`), and although a part of them is no noise
+(`reported_covariance`).
 
 The likelihood's own covariance takes the free run for its tangent, and disturbances for spread by the linear line. Both
 are wrong where faces meet or friction turns. There the free run has kinks closer together than a value is known, so
@@ -16,13 +19,17 @@ A linear line has neither: its intervals stay those of the likelihood.
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.diagnosis.inference.descent import Weigh
 from estimator.diagnosis.inference.disturbances import Size
+from estimator.diagnosis.inference.hypotheses import Hypothesis
+from estimator.diagnosis.inference.remainder import residuals_by_record, unpredictable
 from estimator.diagnosis.line.line import FormPlace, LinearLine, form_shifts, line_of
+from estimator.diagnosis.thresholds import Intervals, Telling
 from estimator.physics.catalogue import KERNEL
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
@@ -30,10 +37,10 @@ from estimator.physics.jacobian import secants_at
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.problem import outputs_at
+from estimator.signals.correlation import correlation_length
 from estimator.signals.record import BoolArray, FloatArray, by_output
 
-LEAST, MOST = 1e-4, 1e-2
-"""Widths of a scaled unknown over which a slope is taken: no closer than kinks are, no farther than a law stays one."""
+Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
 
 ROUNDS = 2  # the first is over the width that the derivative at a point gives
 
@@ -46,6 +53,110 @@ _NONLINEAR = tuple(
     for parameter in entry.parameters[:1]
 )
 """Decisive parameter of each effect by which a line is not linear, and its value where the effect is not there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The fit that values and intervals are taken from, and how well its unknowns are known."""
+
+    fit: FitResult  # of independent innovations where these are all that is left; else of the free run
+    covariance: FloatArray  # (U, U): of its scaled unknowns
+
+
+def estimate_of(believed: Hypothesis, is_whole: bool, free: FitResult) -> Estimate:
+    """Return what values are taken from: of a hypothesis that leaves nothing but its disturbances, or of a free run."""
+
+    def weigh(errors: FloatArray) -> FloatArray:
+        return believed.filter(errors) if is_whole else errors / free.rms
+
+    plain = with_secants(believed.result if is_whole else free, weigh)
+    fit = replace(believed, result=plain).white if is_whole else plain
+    fitted_s, period_s = (each.problem.records[0].sample_time_s for each in (believed.result, plain))
+    sizes = believed.sizes.copy()
+    sizes[Size.TORQUE] += 0.5 * math.log(fitted_s / period_s)  # of one sample, where these are closer together
+    along = reported_covariance(fit)
+    return Estimate(fit, along + beyond_the_line(plain, weigh, sizes, free_unknowns(fit)))
+
+
+def covariance(result: FitResult) -> FloatArray:
+    """Return the covariance of the scaled unknowns, shape (U, U), by the sandwich formula.
+
+    ``C = B M B`` with ``B = (J'J)^-1`` and ``M`` the long-run covariance of the scores ``J_k e_k``, Bartlett
+    weights over several correlation lengths of the error (Newey and West, Econometrica 55, 1987). An effect's
+    parameter at a bound of its law is held there and has no variance. A nominal parameter at the edge of its tolerance
+    is not: the tolerance is a belief about it, and how well the data determine it does not change there.
+    """
+    return _sandwich(result, free_unknowns(result))
+
+
+def _sandwich(result: FitResult, free: BoolArray) -> FloatArray:
+    j = result.jacobian[:, free]
+    bread = _bread(j)
+    full = np.zeros((result.x.size, result.x.size))
+    full[np.ix_(free, free)] = bread @ _meat(result, j) @ bread
+    return full
+
+
+def reported_covariance(result: FitResult) -> FloatArray:
+    """Return the covariance that intervals are reported from, shape (U, U): of the noise, and of what is no noise.
+
+    The part of the error that its own past predicts is physics written another way, or the torque reading's own
+    noise. It pulls the unknowns as an error would that keeps its value for ``COHERENT_S``: its mean square times that
+    many samples takes the place of the noise's variance in ``sigma^2 (J'J)^-1``. A parameter that ended at a bound of
+    its law has the variance that it would have without the bound, by itself: its interval goes one way, from the bound.
+    """
+    free, coherent = free_unknowns(result), coherent_variance(result)
+
+    def reported(free: BoolArray) -> FloatArray:
+        full = _sandwich(result, free)
+        full[np.ix_(free, free)] += coherent * _bread(result.jacobian[:, free])
+        return full
+
+    full, each = reported(free), np.arange(result.x.size)
+    for i in (i for i, shared in enumerate(result.problem.shared) if not free[i] and shared.low < shared.high):
+        full[i, i] = reported(free | (each == i))[i, i]
+    return full
+
+
+def coherent_variance(result: FitResult) -> float:
+    """Return the mean square of the error that is no noise, times the samples for which it keeps its value."""
+    coherent = max(result.rms**2 - unpredictable(residuals_by_record(result)) ** 2, 0.0)
+    return coherent * Telling.COHERENT_S / min(record.sample_time_s for record in result.problem.records)
+
+
+def free_unknowns(result: FitResult) -> BoolArray:
+    """Return which unknowns have a variance, shape (U,): all but parameters of effects at a bound of their law."""
+    held = result.pinned
+    of_effects = np.array([bool(shared.effect) for shared in result.problem.shared], dtype=np.bool_)
+    held[: of_effects.size] &= of_effects
+    return ~held
+
+
+def _bread(jacobian: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
+
+
+def _meat(result: FitResult, jacobian: FloatArray) -> FloatArray:
+    errors = residuals_by_record(result)
+    shortest = min(error.size for error in errors)
+    lags = int(min(Intervals.LAGS * correlation_length(errors), shortest / Intervals.LAG_SHARE))
+    total = np.zeros((jacobian.shape[1], jacobian.shape[1]))
+    first = 0
+    for error in errors:
+        scores = jacobian[first : first + error.size] * error[:, None]
+        first += error.size
+        total += _long_run(scores, lags)
+    n = result.residual.size
+    return total * n / max(n - jacobian.shape[1], 1)
+
+
+def _long_run(scores: FloatArray, lags: int) -> FloatArray:
+    """Sum the Bartlett-weighted cross products of the scores up to a distance of ``lags``, by block differences."""
+    window = max(lags, 1)
+    padded = np.vstack([np.zeros((window, scores.shape[1])), scores, np.zeros((window - 1, scores.shape[1]))])
+    sums = np.cumsum(padded, axis=0)
+    blocks = sums[window:] - sums[:-window]
+    return blocks.T @ blocks / window
 
 
 def switches(result: FitResult) -> bool:
@@ -64,7 +175,7 @@ def with_secants(result: FitResult, weigh: Weigh) -> FitResult:
     for _ in range(ROUNDS):
         white = weigh(result.jacobian)
         spread = np.sqrt(np.diag(np.linalg.pinv(white.T @ white, hermitian=True)))
-        widths = np.clip(spread, LEAST, MOST)
+        widths = np.clip(spread, Intervals.LEAST_WIDTH, Intervals.MOST_WIDTH)
         secants = secants_at(result.problem, result.x, result.outputs, widths)
         result = replace(result, derivative=secants, converged=True)
     return result

@@ -1,4 +1,8 @@
-"""What is said: the result of a diagnosis, made from the decision's record and from nothing else."""
+"""What is said: the result of a diagnosis, made from the records of decision and search and from nothing else.
+
+Values with their intervals, the place of a mismatch, the statement; and what was tried: every set that was fitted, what
+the search cost, and why effects are rejected.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +13,19 @@ from dataclasses import dataclass, replace
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.assemble import (
     augmented_model,
+    found_effect,
     load_torques,
-    moved_values,
-    reported_covariance,
     retuned_parameters,
+    slight,
 )
-from estimator.diagnosis.inference.checks import tests_in_words
+from estimator.diagnosis.covariance import estimate_of, reported_covariance
 from estimator.diagnosis.inference.decide import Decision, Judged
-from estimator.diagnosis.inference.figures import courses_of, figures_without, first_figures, found_effect
+from estimator.diagnosis.inference.figures import figures_without, first_figures
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, open_hypotheses
+from estimator.diagnosis.inference.remainder import Test
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.trials import Standing, Trial
-from estimator.diagnosis.inference.wording import Context, statement
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -35,14 +39,14 @@ from estimator.diagnosis.result import (
     RejectedEffect,
     Remainder,
     Retuned,
-    Slight,
     UntestableEffect,
     Verdict,
 )
-from estimator.diagnosis.table_answer import NO_LAW, Law, sentences
-from estimator.diagnosis.thresholds import Noise
+from estimator.diagnosis.tables import NO_LAW, Law
+from estimator.diagnosis.thresholds import Noise, Telling
 from estimator.diagnosis.where import locate
-from estimator.diagnosis.where.discrepancy import discrepancy
+from estimator.diagnosis.where.discrepancy import courses_of, discrepancy
+from estimator.diagnosis.wording import Context, statement
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.model import DrivelineModel
@@ -70,29 +74,43 @@ class Basis:
 
 
 def said(basis: Basis) -> Diagnosis:
-    """Return the diagnosis."""
-    decision, line, law = basis.decision, basis.search.fits.model, basis.law
-    judged, runs, verdict = decision.judged, decision.runs, decision.verdict
+    """Return the diagnosis: values with their intervals, the place, what was tried, and all of it in words."""
+    decision, fits, law = basis.decision, basis.search.fits, basis.law
+    judged, runs, verdict, line = decision.judged, decision.runs, decision.verdict, fits.model
+    nothing, best, believed = (each.hypothesis for each in (judged.nothing, judged.best, judged.believed))
     is_explained = verdict is not Verdict.UNEXPLAINED
-    named = [found_effect(each, runs) for each in judged.named]
-    is_uncounted = bool(basis.doubts) or any(name in TABLES for name in line.effects)
-    effects = _as_sure_as(is_uncounted, (*named, *decision.acquired) if is_explained else ())
     traces = judged.traces if is_explained else ()
-    added = [*effects, *(found_effect(each, runs) for each in traces)]
-    slight = tuple(_slight(each, basis) for each in traces)
-    augmented, courses = augmented_model(runs.estimate, runs.covariance, basis.model, added), courses_of(runs)
-    seen = None
+
+    estimate = estimate_of(runs.believed, runs.is_whole, runs.after)
+    fit, covariance = estimate.fit, estimate.covariance
+    named, noticed = ([found_effect(each, runs, estimate) for each in of] for of in (judged.named, traces))
+    slighted = tuple(slight(each, believed, fits.without(believed, each.name).result) for each in traces)
+    added = (*named, *decision.acquired) if is_explained else ()
+    augmented = augmented_model(fit, covariance, basis.model, (*added, *noticed))
+    parameters, loads = retuned_parameters(fit, covariance, line, is_explained), load_torques(fit, covariance, line)
+
+    courses, seen = courses_of(runs), None
     if verdict is not Verdict.NO_MISMATCH and line.plant is None:
-        nothing, believed = (each.hypothesis.result.first_outputs() for each in (judged.nothing, judged.believed))
-        seen = discrepancy(nothing, believed if law is None else law.found.result, judged.noise, line.motion)
+        before, after = (each.result.first_outputs() for each in (nothing, believed))
+        seen = discrepancy(before, after if law is None else law.found.result, judged.noise, line.motion)
+
+    if law is not None:
+        augmented, courses = law.augmented(augmented), law.drawn(courses, believed, runs)
+        parameters = {name: each.at(augmented.parameters[name].value) for name, each in parameters.items()}
+        loads = load_torques(law.final, reported_covariance(law.final), line)
+
     mismatch, remainder = _mismatch(basis, seen), _remainder(decision, law)
-    rejected, standings = _rejected(basis), (*judged.named, *judged.traces, *judged.refinements)
-    looked_at = {other for each in standings for other in (each.name, *each.alike)} | {each.name for each in rejected}
+    is_uncounted = bool(basis.doubts) or any(name in TABLES for name in line.effects)
+    effects = _as_sure_as(is_uncounted, added)
+    elsewhere = {*basis.effort.untried, *(() if law is None else law.found.effects)}
+    others = rejected(fits, decision, basis.refinements, elsewhere)
+    standings = (*judged.named, *judged.traces, *judged.refinements)
+    looked_at = {other for each in standings for other in (each.name, *each.alike)} | {each.name for each in others}
     blind = open_hypotheses(line, runs.chain.records)[1]  # behind a sensor blind for the sign more is tried than these
     untestable = untestable_effects({name: why for name, why in blind.items() if name not in looked_at})
     context = Context(
         remainder,
-        slight,
+        slighted,
         [each.name for each in basis.refinements],
         judged.off_nominal,
         untestable,
@@ -102,19 +120,13 @@ def said(basis: Basis) -> Diagnosis:
         basis.doubts,
     )
     is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
-    said_of_law = NO_LAW if is_without else "" if law is None else sentences(law.table, decision.figures.unit)
-    parameters = retuned_parameters(runs.estimate, runs.covariance, line, is_explained)
-    loads = load_torques(runs.estimate, runs.covariance, line)
-    if law is not None:
-        augmented, courses = law.augmented(augmented), law.drawn(courses, judged.believed.hypothesis, runs)
-        parameters = {name: each.at(augmented.parameters[name].value) for name, each in parameters.items()}
-        loads = load_torques(law.final, reported_covariance(law.final), line)
+    said_of_law = NO_LAW if is_without else "" if law is None else law.said
     return Diagnosis(
         verdict=verdict,
         statement=f"{statement(verdict, decision.figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
         mismatch=mismatch,
         effects=effects,
-        rejected=rejected,
+        rejected=others,
         untestable=untestable,
         fit=decision.figures if law is None else law.fit,
         parameters=parameters,
@@ -127,9 +139,9 @@ def said(basis: Basis) -> Diagnosis:
         discrepancy=seen,
         remainder=remainder,
         off_nominal=judged.off_nominal,
-        slight=slight,
+        slight=slighted,
         refinements=tuple(
-            Refinement(each.name, each.objection, each.necessity.value, _values(judged.best, each))
+            Refinement(each.name, each.objection, each.necessity.value, best.result.values_of(each.name))
             for each in basis.refinements
         ),
         table=None if law is None else law.table,
@@ -162,11 +174,7 @@ def undecided(
         parameters, loads = retuned_parameters(estimate, cov, line, False), load_torques(estimate, cov, line)
     except TimeIsUp:  # the whole limit, after which another program simulates no more
         fit = figures_without(chain, line, nothing)
-    tried = set() if fits is None else {*fits.scores(), *fits.implausible}
-    untried = tuple(name for name in names if name not in tried)
-    simulations = 0 if fits is None else fits.simulations
-    sets = () if fits is None else fitted_sets(fits)
-    effort = Effort(level, simulations, False, untried, len(names), work.limit_s, sets)
+    effort = effort_so_far(fits, names, work, level)
     untestable = untestable_effects(blind)
     context = Context(untestable=untestable, can_be_retuned=can_be_retuned(line), doubts=doubts)
     return Diagnosis(
@@ -187,37 +195,6 @@ def undecided(
     )
 
 
-def fitted_sets(fits: Fits, way: Sequence[Hypothesis] = (), judged: Judged | None = None) -> tuple[FittedSet, ...]:
-    """Return every set that was fitted, the smaller first, then the more probable: threads fit in any order."""
-    steps = {each.effects for each in way}
-    best = min((each.score for each in fits.ended.values()), default=math.nan)
-    found = []
-    for effects, before in list(fits.started_from.items()):
-        fit = fits.ended.get(effects) or fits.rough.get(effects)
-        trial = None if judged is None else judged.tried.get(effects)
-        rms = math.nan if trial is None else trial.rms
-        outcome = _outcome(effects, fits, steps, judged, rms)
-        score = math.nan if fit is None else fit.score - best
-        found.append(FittedSet(tuple(sorted(effects)), tuple(sorted(before)), score, rms, outcome))
-    return tuple(sorted(found, key=lambda e: (len(e.effects), math.isnan(e.score), e.score, e.effects)))
-
-
-def _outcome(effects: Effects, fits: Fits, steps: Set[Effects], judged: Judged | None, rms: float) -> str:
-    if effects not in fits.ended and effects not in fits.rough:
-        return "its values are no case of it"
-    if judged is None:
-        return "the limit of time came before it was judged"
-    if effects == judged.believed.effects:
-        return "believed"
-    if effects == judged.best.effects:
-        return "where the search ended; what of it is not established is a refinement"
-    if effects in steps:
-        return "on the way of the search"
-    if rms > judged.believed.rms:
-        return "simulates worse than what is believed"
-    return "less probable" if effects in fits.ended else "left after a few steps: others promised more"
-
-
 def can_be_retuned(line: DrivelineModel) -> bool:
     """Tell whether a parameter is fitted: of a plant simulated elsewhere those that it can be given."""
     return line.plant is None or any(parameter.tolerance > 0.0 for parameter in line.parameters.values())
@@ -226,23 +203,6 @@ def can_be_retuned(line: DrivelineModel) -> bool:
 def untestable_effects(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]:
     """Return the effects that the recordings can't tell, with the reason and a test that could."""
     return tuple(UntestableEffect(n, u.reason, u.suggested_test, u.needs) for n, u in blind.items())
-
-
-def _slight(trace: Standing, basis: Basis) -> Slight:
-    """Return a trace; without it some values are others, though the error hardly is."""
-    believed = basis.decision.judged.believed
-    without = basis.search.fits.without(believed.hypothesis, trace.name)
-    return Slight(
-        trace.name,
-        trace.share,
-        _values(believed, trace),
-        moved_values(believed.hypothesis, without.result),
-        trace.slight,
-    )
-
-
-def _values(trial: Trial, standing: Standing) -> Mapping[str, float]:
-    return trial.hypothesis.result.values_of(standing.name)
 
 
 def _place(basis: Basis, seen: Discrepancy | None) -> Element | None:
@@ -296,19 +256,86 @@ def _remainder(decision: Decision, law: Law | None) -> Remainder | None:
     )
 
 
-def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
+def tests_in_words(failed: Sequence[Test]) -> str:
+    """Say what an error does that noise does not, as the end of a sentence that begins with "it"."""
+    names = [test.name for test in failed]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def effort_of(search: Search, level: str, decision: Decision) -> Effort:
+    """Return what a search cost; ``untried`` is what looked worth a fit and had none."""
+    fits, best = search.fits, decision.judged.believed.hypothesis.score
+    settled = {*fits.implausible, *(name for effects in (*fits.ended, *fits.rough) for name in effects)}
+    untried = tuple(name for name in fits.names if name not in settled and fits.foreseen.get(name, -math.inf) < best)
+    sets = fitted_sets(fits, search.path, decision.judged)
+    return Effort(level, fits.simulations, True, untried, len(fits.names), sets=sets)
+
+
+def effort_so_far(fits: Fits | None, names: Sequence[str], work: Work, level: str) -> Effort:
+    """Return what a search had cost when the limit of time ended it; without fits, it had not begun."""
+    if fits is None:
+        return Effort(level, 0, False, tuple(names), len(names), work.limit_s)
+    tried = {*fits.scores(), *fits.implausible}
+    untried = tuple(name for name in names if name not in tried)
+    return Effort(level, fits.simulations, False, untried, len(names), work.limit_s, fitted_sets(fits))
+
+
+def warnings_of(search: Search, level: str) -> tuple[str, ...]:
+    """Return what is to be said of a search that ended at its limit of simulations."""
+    if not search.is_cut_short:
+        return ()
+    return (
+        f"the search ended with the best set of effects so far, after the {Telling.LEVELS[level]:,} simulations of its "
+        f"effort ({level}); further effects, and look-alikes of those named, were not tried. Try --effort thorough, or "
+        "fewer recordings.",
+    )
+
+
+def fitted_sets(fits: Fits, way: Sequence[Hypothesis] = (), judged: Judged | None = None) -> tuple[FittedSet, ...]:
+    """Return every set that was fitted, the smaller first, then the more probable: threads fit in any order."""
+    steps = {each.effects for each in way}
+    best = min((each.score for each in fits.ended.values()), default=math.nan)
+    found = []
+    for effects, before in list(fits.started_from.items()):
+        fit = fits.ended.get(effects) or fits.rough.get(effects)
+        trial = None if judged is None else judged.tried.get(effects)
+        rms = math.nan if trial is None else trial.rms
+        outcome = _outcome(effects, fits, steps, judged, rms)
+        score = math.nan if fit is None else fit.score - best
+        found.append(FittedSet(tuple(sorted(effects)), tuple(sorted(before)), score, rms, outcome))
+    return tuple(sorted(found, key=lambda e: (len(e.effects), math.isnan(e.score), e.score, e.effects)))
+
+
+def _outcome(effects: Effects, fits: Fits, steps: Set[Effects], judged: Judged | None, rms: float) -> str:
+    if effects not in fits.ended and effects not in fits.rough:
+        return "its values are no case of it"
+    if judged is None:
+        return "the limit of time came before it was judged"
+    if effects == judged.believed.effects:
+        return "believed"
+    if effects == judged.best.effects:
+        return "where the search ended; what of it is not established is a refinement"
+    if effects in steps:
+        return "on the way of the search"
+    if rms > judged.believed.rms:
+        return "simulates worse than what is believed"
+    return "less probable" if effects in fits.ended else "left after a few steps: others promised more"
+
+
+def rejected(
+    fits: Fits, decision: Decision, refinements: Sequence[Standing], elsewhere: Set[str]
+) -> tuple[RejectedEffect, ...]:
     """Return the rivals that lost, the nearest first, each with what was done and by how much it is worse.
 
     ``delta_bic`` is by how much the best set with a rival is less probable than the best of all: fitted, or as a score
-    test foresees it at most.
+    test foresees it at most. Effects that are listed ``elsewhere``, and look-alikes of a name, are not among them.
     """
-    fits, judged = basis.search.fits, basis.decision.judged
+    judged = decision.judged
     best = judged.believed.hypothesis.score
     standings = (*judged.named, *judged.traces, *judged.refinements)
     known = {each.name for each in standings} | {other for each in standings for other in each.alike}
-    known |= {each.name for each in basis.decision.acquired} | {*basis.effort.untried}
-    known |= set() if basis.law is None else {*basis.law.found.effects}
-    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in basis.refinements}
+    known |= {each.name for each in decision.acquired} | elsewhere
+    found = {each.name: RejectedEffect(each.name, each.objection, 0.0) for each in refinements}
     for scores, reason in (
         (fits.scores(), "fitted: the best set with it is {}"),
         (fits.implausible, "fitted, and ended at values that are no case of it"),
@@ -316,8 +343,9 @@ def _rejected(basis: Basis) -> tuple[RejectedEffect, ...]:
     ):
         for name, score in sorted(scores.items(), key=lambda item: item[::-1]):  # not as cores came to their end
             if name not in found and name not in known:
+                fitted = reason.format(_compared(score - best))
                 seen = _as_tried(name, judged.tried.values(), judged.believed)
-                text = seen if seen and score < best else reason.format(_compared(score - best))
+                text = seen if seen and score < best else fitted
                 found[name] = RejectedEffect(name, text, min(best - score, 0.0))
     return tuple(sorted(found.values(), key=lambda each: -each.delta_bic))
 
@@ -342,7 +370,7 @@ def _as_tried(name: str, tried: Iterable[Trial], believed: Trial) -> str:
 
 def _compared(worse: float) -> str:
     """Say by how much a score is worse than that of what is believed; one that is better is no ground to reject it."""
-    if abs(worse) < 0.1:
+    if abs(worse) < Telling.NO_WORSE:
         return "as good as without"
     if worse < 0.0:
         return (

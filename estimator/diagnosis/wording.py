@@ -35,7 +35,7 @@ LINE = frozenset({"J_M", "J_L", "k"})  # what a line's answer to a torque is in 
 
 def times(ratio: float) -> str:
     """Return a multiple to three digits as people write it: 281 and not 2.81e+02."""
-    return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
+    return f"{float(f'{ratio:.3g}'):.0f}" if ratio >= Telling.WHOLE_FROM else f"{ratio:.3g}"
 
 
 @dataclass(frozen=True, slots=True)
