@@ -17,7 +17,6 @@ import numpy as np
 from estimator.diagnosis.thresholds import Curves
 from estimator.least_squares import minimise
 from estimator.physics.curve import curve_over
-from estimator.physics.driveline import Structure
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import OBSERVER, flat_values, slot
@@ -37,13 +36,6 @@ YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 
 LEVEL, SUDDEN = 0.7, 10.0  # where its level starts, in the torque in use, and its knee
 
-SEARCHED = {
-    Structure.ONE_MASS: ("torque", "motor_speed"),
-    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
-    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
-    Structure.JOINT: ("shaft_twist", "shaft_rate"),
-}
-"""Places at which a curve is looked for."""
 
 Z95 = 1.96  # half of a 95 % interval, in standard deviations
 
@@ -357,15 +349,6 @@ def best_curve(begun: Scouted, choosing: Masks) -> Candidate:
         z, _ = descent.fitted(best.z, 0.0, smooth, STEPS)
         best = min(best, Candidate(descent, z, smooth, descent.error(z, choosing)), key=lambda each: each.chosen_by)
     return best
-
-
-def curve_through(result: FitResult, place: str) -> Candidate | None:
-    """Return the free form of a law at a place, fitted to all samples that count; None where the line hardly moved."""
-    curve = None if place not in SEARCHED[result.problem.grid.structure] else curve_at(place, result, GAINS[0])
-    if curve is None:
-        return None
-    begun = scouted(curve, result, result.problem.use)
-    return best_curve(begun, result.problem.use)
 
 
 def with_curve(found: Candidate) -> FitResult:

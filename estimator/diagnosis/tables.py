@@ -24,7 +24,6 @@ from estimator.diagnosis.inference.trials import Trial, between_blocks, inside_b
 from estimator.diagnosis.result import Fit, Trace, UnnamedTable
 from estimator.diagnosis.table_curves import (
     GAINS,
-    SEARCHED,
     SLIDER,
     STEPS,
     YIELDING,
@@ -34,7 +33,6 @@ from estimator.diagnosis.table_curves import (
     Masks,
     best_curve,
     curve_at,
-    curve_through,
     reported,
     rms_over,
     scouted,
@@ -44,6 +42,7 @@ from estimator.diagnosis.table_curves import (
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.diagnosis.thresholds import Curves
 from estimator.physics.catalogue import EFFECTS
+from estimator.physics.driveline import Structure
 from estimator.physics.effect import Element
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
@@ -54,6 +53,16 @@ from estimator.physics.tables import PLACES, Table
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 AT_SLIDER = slot(SLIDER, "friction_nm")
+
+
+SEARCHED = {
+    Structure.ONE_MASS: ("torque", "motor_speed"),
+    Structure.TWO_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
+    Structure.THREE_MASS: ("torque", "motor_speed", "shaft_twist", YIELDING, "shaft_rate", "load_speed"),
+    Structure.JOINT: ("shaft_twist", "shaft_rate"),
+}
+"""Places at which a curve is looked for."""
+
 
 VARIABLES: Mapping[Element, str] = {
     Element.TORQUE_PATH: "torque",
@@ -89,6 +98,15 @@ def free_form(without: Trial, name: str) -> Trial | None:
     free = FitResult(tuned, x, outputs, residual_at(tuned, outputs), None, False)
     squares, samples = inside_blocks(free)
     return Trial(hypothesis, without.size + 1, free, squares, samples)
+
+
+def curve_through(result: FitResult, place: str) -> Candidate | None:
+    """Return the free form of a law at a place, fitted to all samples that count; None where the line hardly moved."""
+    curve = None if place not in SEARCHED[result.problem.grid.structure] else curve_at(place, result, GAINS[0])
+    if curve is None:
+        return None
+    begun = scouted(curve, result, result.problem.use)
+    return best_curve(begun, result.problem.use)
 
 
 Values = Mapping[str, Mapping[str, EffectValue]]

@@ -7,9 +7,8 @@ import pytest
 
 from estimator.diagnosis.inference.disturbances import Limits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
-from estimator.diagnosis.table_curves import curve_through
 from estimator.diagnosis.table_words import looks_like, shortest_formula
-from estimator.diagnosis.tables import best_table, widened_by_jackknife
+from estimator.diagnosis.tables import best_table, curve_through, widened_by_jackknife
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.simulate import simulate
