@@ -48,6 +48,7 @@ class Doubt:
     odds: float  # that something is wrong, 0 and up
     line: str = ""  # for `[signals]`; "" where none is known
     cure: Cure | None = None  # what the line does
+    differs: Mapping[str, float] = field(default_factory=dict)  # ratios of one recording's line to the others'
 
 
 @dataclass(frozen=True, slots=True)

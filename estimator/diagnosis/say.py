@@ -26,6 +26,8 @@ from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, open_h
 from estimator.diagnosis.inference.remainder import Test
 from estimator.diagnosis.inference.search import Search
 from estimator.diagnosis.inference.trials import Standing, Trial
+from estimator.diagnosis.line.line import line_values
+from estimator.diagnosis.preconditions.agreement import is_answered
 from estimator.diagnosis.result import (
     Diagnosis,
     Discrepancy,
@@ -64,7 +66,7 @@ class Basis:
     effort: Effort  # simulations and time spent
     warnings: tuple[str, ...] = ()  # about the recordings, as sentences
     law: Law | None = None  # without a name, next to what is decided
-    doubts: Sequence[Doubt] = ()  # about the input
+    doubts: Sequence[Doubt] = ()  # about the input, before what was found
 
     @property
     def refinements(self) -> tuple[Standing, ...]:
@@ -100,7 +102,9 @@ def said(basis: Basis) -> Diagnosis:
         loads = load_torques(law.final, reported_covariance(law.final), line)
 
     mismatch, remainder = _mismatch(basis, seen), _remainder(decision, law)
-    is_uncounted = bool(basis.doubts) or any(name in TABLES for name in line.effects)
+    values, records = line_values(believed.result), runs.chain.records
+    doubts = tuple(each for each in basis.doubts if not is_answered(each, named, line, values, records))
+    is_uncounted = bool(doubts) or any(name in TABLES for name in line.effects)
     effects = _as_sure_as(is_uncounted, added)
     elsewhere = {*basis.effort.untried, *(() if law is None else law.found.effects)}
     others = rejected(fits, decision, basis.refinements, elsewhere)
@@ -117,7 +121,7 @@ def said(basis: Basis) -> Diagnosis:
         can_be_retuned(line),
         mismatch.element,
         None if seen is None else seen.element,
-        basis.doubts,
+        doubts,
     )
     is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
     said_of_law = NO_LAW if is_without else "" if law is None else law.said
@@ -135,7 +139,7 @@ def said(basis: Basis) -> Diagnosis:
         augmented=augmented,
         traces=courses,
         warnings=basis.warnings,
-        doubts=tuple(basis.doubts),
+        doubts=doubts,
         discrepancy=seen,
         remainder=remainder,
         off_nominal=judged.off_nominal,

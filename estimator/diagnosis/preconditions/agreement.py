@@ -8,13 +8,13 @@ Nor are friction and damping: a dry friction, which a diagnosis is to find, make
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.diagnosis.result import Doubt
+from estimator.diagnosis.result import Doubt, FoundEffect
 from estimator.diagnosis.thresholds import Mistakes
 from estimator.diagnosis.wording import times
 from estimator.errors import EstimatorError
@@ -24,6 +24,7 @@ from estimator.identification.modes.physical import RESPONDING, physical_paramet
 from estimator.identification.offline.fits import fit_of, solved
 from estimator.identification.offline.linearity import judge_linearity
 from estimator.identification.offline.validation import validate
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
 from estimator.signals.decimate import HIGH_PASS_HZ, first_part, high_passed
 from estimator.signals.record import OutputKind, Record
@@ -36,10 +37,49 @@ def disagreements(records: Sequence[Record], model: DrivelineModel) -> list[Doub
     found = {record.name: line for record in records if (line := _own_line(record, model)) is not None}
     asked = found if len(found) > 2 else list(found)[1:]  # of two, nobody knows which
     return [
-        Doubt(name if len(found) > 2 else ", ".join(found), _statement(name, found, differing), Mistakes.BOTH_HOLD)
+        Doubt(
+            name if len(found) > 2 else ", ".join(found),
+            _statement(name, found, differing),
+            Mistakes.BOTH_HOLD,
+            differs=differing,
+        )
         for name in asked
         if (differing := _differing(name, found))
     ]
+
+
+def is_answered(
+    doubt: Doubt,
+    effects: Iterable[FoundEffect],
+    model: DrivelineModel,
+    line: Mapping[str, float],
+    records: Sequence[Record],
+) -> bool:
+    """Tell whether a change of the line that was found in the recordings is what one of them differs by.
+
+    ``line`` has the values before the change. It must begin or end while a recording runs: one between recordings may
+    as well be another vehicle.
+    """
+    ratios = {}
+    for each in effects:
+        step = EFFECTS[each.name].step
+        if step is not None and any(_begins_or_ends_in(record, each) for record in records):
+            name, (size, *_) = step.of(model), each.parameters.values()
+            ratios[name] = step.turned(line[name], size.value)[0] / line[name]
+    return bool(doubt.differs) and all(
+        name in ratios and _is_either_way(ratio, ratios[name]) for name, ratio in doubt.differs.items()
+    )
+
+
+def _begins_or_ends_in(record: Record, event: FoundEffect) -> bool:
+    first_s, last_s = record.time_s[0] + record.sample_time_s, record.time_s[-1] - record.sample_time_s
+    return any(first_s < moment_s < last_s for span in event.time_s.get(record.name, ()) for moment_s in span)
+
+
+def _is_either_way(ratio: float, change: float) -> bool:
+    """Tell whether a ratio of two recordings is that of a change, whichever of them came first."""
+    off = min(abs(math.log(ratio / change)), abs(math.log(ratio * change)))
+    return off < math.log(Mistakes.LEAST_RATIO)
 
 
 def _own_line(record: Record, model: DrivelineModel) -> Mapping[str, Uncertain] | None:

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.diagnosis.preconditions.agreement import disagreements
-from estimator.diagnosis.result import Doubt
+from estimator.diagnosis.preconditions.agreement import disagreements, is_answered
+from estimator.diagnosis.result import Doubt, Estimated, Evidence, FoundEffect
 from estimator.physics.driveline import InitialCondition
+from estimator.physics.effect import Element
 from estimator.signals.record import Record
 from tests.estimator.diagnosis.planted import SIGMA, disturbed, drive_torque
 from tests.estimator.diagnosis.test_preconditions_units import LAWS
@@ -68,3 +69,27 @@ def test_missing_physics_is_no_disagreement_however_large_the_torque(law: str) -
 def test_one_that_tells_no_line_is_not_compared() -> None:
     still = replace(drive("d"), output=0.02 * np.random.default_rng(1).standard_normal(SAMPLES))
     assert asked(drive("a"), still) == []
+
+
+def crack(change: float, begins_s: float) -> FoundEffect:
+    """Return a stiffness that changes in ``b``, and stays so in ``d``."""
+    moments = {"b": ((begins_s, 20.0),), "d": ((0.0, 20.0),)}
+    size = {"change": Estimated(change, (change, change), "")}
+    return FoundEffect("stiffness_change", Element.SHAFT, "", size, moments, (), Evidence(0.0, 1.0, 1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "begins_s", "answered"), [(-0.4, 9.0, True), (-0.4, 0.0, False), (-0.1, 9.0, False), (0.7, 9.0, True)]
+)
+def test_a_change_seen_as_it_happens_answers_what_recordings_differ_by(
+    change: float, begins_s: float, answered: bool
+) -> None:
+    records = [drive("a"), drive("b"), drive("d", k=0.6)]
+    (doubt,) = asked(*records)
+    assert is_answered(doubt, [crack(change, begins_s)], model(TWO_MASS), TWO_MASS, records) is answered
+
+
+def test_another_parameter_answers_nothing() -> None:
+    records = [drive("a"), drive("b"), drive("d", J_L=1.7)]
+    (doubt,) = asked(*records)
+    assert not is_answered(doubt, [crack(-0.4, 9.0)], model(TWO_MASS), TWO_MASS, records)
