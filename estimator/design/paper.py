@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.design.open import Candidate, Open
-from estimator.diagnosis.assemble import Z95
+from estimator.diagnosis.assemble import Z95, load_torques
 from estimator.diagnosis.inference.disturbances import whitener_of
-from estimator.diagnosis.inference.hypotheses import GRADE
+from estimator.diagnosis.inference.hypotheses import GRADE, covariance
 from estimator.diagnosis.line.line import line_values
 from estimator.diagnosis.thresholds import THRESHOLDS
 from estimator.physics.catalogue import EFFECTS
@@ -46,7 +46,10 @@ MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponentia
 
 
 def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
-    """Return a hypothesis as a model to drive on paper; its events last throughout, a road stays level."""
+    """Return a hypothesis as a model to drive on paper; its events last throughout.
+
+    The load is the constant torque of the recording that knows it best: what pushed the vehicle will push it again.
+    """
     result = candidate.fit.result
     values = line_values(result)
     always = {"from_s": EffectValue(0.0), "to_s": EffectValue(1e9)}
@@ -57,7 +60,9 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
         for name in candidate.effects - {GRADE}
     }
     given = {name: each.at(values[name]) for name, each in line.parameters.items()}
-    return replace(line, parameters=given, effects={**line.effects, **added})
+    loads = load_torques(result, covariance(candidate.fit), line).values()
+    load = min(loads, key=lambda each: each.ci95[1] - each.ci95[0]).value
+    return replace(line, parameters=given, effects={**line.effects, **added}, load=load)
 
 
 def _on_paper(candidate: Candidate, line: DrivelineModel, records: Sequence[Record]) -> FitResult:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
+from types import MappingProxyType
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -104,8 +105,17 @@ class Design:
         return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE_INTERVAL)
 
 
-def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> Design:
-    """Choose the next experiment for a rig.
+def designed(
+    source: RigSource,
+    known: Open,
+    aim: Aim,
+    progress: Progress,
+    driven: Collection[str] = (),
+    ended_early: Mapping[str, str] = MappingProxyType({}),
+) -> Design:
+    """Choose the next experiment for a rig; none that ended early, by name and what was met.
+
+    What was ``driven`` before may be driven again to decide, and shows no effect that it has not shown.
 
     To decide, it is one that decides between explanations, where any does; of these the one that shows most of what no
     recording so far could. Where none decides, or nothing is to be decided between, it is the one that shows most.
@@ -114,8 +124,8 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
     limits = Limits.of(rig)
     model = as_model(known.candidates[0], known.line)
     found: list[_Judged] = []
-    refused: dict[str, str] = {}
-    wanted = list(candidates(rig, limits))
+    refused = dict(ended_early)
+    wanted = [each for each in candidates(rig, limits) if each[0] not in ended_early]
     with threadpool_limits(1, user_api="blas"):
         for i, (name, table) in enumerate(wanted):
             progress(f"on paper: {name}", i / len(wanted))
@@ -124,7 +134,8 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
             except (InputError, CommandRefused, RunAborted) as error:
                 refused[name] = str(error)
                 continue
-            found.append(_judged(known, planned, aim))
+            asked = replace(known, untested=()) if name in driven else known
+            found.append(_judged(asked, planned, aim))
     progress("designed", 1.0)
     if not found:
         why = next(iter(refused.values()))

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from estimator.design.left_open import _larger as larger
 from estimator.design.open import Candidate, Open, Untested, name_of, precision_of as precision
 from estimator.design.paper import LEAST_DIFFERENCE, _on_paper as on_paper, as_model, distance, expected, shown, widths
 from estimator.design.untested import with_untested
+from estimator.diagnosis.inference.decide import Judged
 from estimator.diagnosis.inference.descent import descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.fits import Fits
@@ -50,6 +52,13 @@ def test_a_limit_that_is_not_there_is_left_out_of_the_model() -> None:
     assert not np.isfinite(list(best.result.values_of("torque_saturation").values())).all()
     model = as_model(Candidate(name_of(best.effects), 1.0, best, precision(best)), fits.model)
     assert "torque_saturation" in model.effects
+
+
+def test_what_pushed_the_vehicle_pushes_it_on_paper(known: Open) -> None:
+    candidate = known.candidates[0]
+    load = as_model(candidate, known.line).load
+    assert isinstance(load, float)
+    assert load == pytest.approx(5.0, abs=0.5)  # InitialCondition of the bench
 
 
 def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
@@ -183,6 +192,16 @@ def test_a_gain_that_the_other_values_take_up_is_untested_however_large_it_is() 
     found = with_untested(left_by(replace(bench, records=read), NAMES[0]))
     assert GAIN in found.untested
     assert found.supposed[GAIN].moves["J_M"] == pytest.approx(-0.05, abs=0.02)
+
+
+def test_a_likely_effect_that_the_verdict_does_not_name_is_another_explanation() -> None:
+    """The friction is there: a verdict of nothing leaves it open, and a verdict that names it leaves nothing open."""
+    bench = bench_with(NAMES[0], {"friction_nm": 8.0})
+    fits = Fits(bench.model, bench.records, bench.use, [NAMES[0], "transport_delay"])
+    friction = search_from_nothing(fits).best
+    nothing, named = fits.trials.of([fits.nothing(), friction])
+    assert [each.effects for each in larger(fits, Judged(nothing, named, nothing))] == [friction.effects]
+    assert larger(fits, Judged(nothing, named, named)) == []
 
 
 FILTER = ("speed_filter", {"time_constant_s": 0.01, "shape": 0.0})
