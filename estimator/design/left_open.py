@@ -50,7 +50,7 @@ def left_open(
 def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) -> Open:
     """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
     search, judged = found.search, found.decision.judged
-    best, is_made = judged.believed.hypothesis, diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH)
+    best = judged.believed.hypothesis
     near = {
         each.effects: each
         for each in search.fits.ended.values()
@@ -58,7 +58,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         and not _holds(each.effects, best.effects)
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
     }
-    near |= {each.effects: each for each in (*(_larger(search.fits, judged) if is_made else ()), best)}
+    near |= {each.effects: each for each in (*_larger(search.fits, judged), best)}
     lowest = min(each.score for each in near.values())
     behind = {effects: each.score - lowest for effects, each in near.items()} | {best.effects: 0.0}
     within = max(Judging.ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
@@ -72,7 +72,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
     traces = frozenset(each.name for each in diagnosis.slight)
     total = sum(weights)
     candidates = tuple(
-        Candidate(name_of(each.effects), weight / total, each, precision_of(each))
+        Candidate(name_of(each.effects), weight / total, each, precision_of(each), moved_values(best, each.result))
         for each, weight in zip(ordered, weights, strict=True)
     )
     names = sorted({name for each in candidates for name in each.effects})
@@ -82,7 +82,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         candidates,
         twins if best.outputs == 1 else {},
         untested,
-        named=named if is_made else None,
+        named=named if diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH) else None,
         traces=traces,
     )
 

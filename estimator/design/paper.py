@@ -167,21 +167,20 @@ def expected(known: Open, record: Record) -> Expected:
     return Expected(gained, float(probability @ (1.0 / rivals.sum(axis=1))))
 
 
-def shown(known: Open, record: Record) -> tuple[str, ...]:
+def shown(known: Open, record: Record) -> dict[str, float]:
     """Return the effects that no recording so far shows or excludes, and all of them with an experiment on paper do.
 
-    One that has a size to suppose has to change the odds by as much as a diagnosis asks for.
+    Each with its expected difference of scores, which has to change the odds by as much as a diagnosis asks for;
+    infinite where the effect has no size to suppose.
     """
     together = [*known.records, record]
-    return tuple(
-        name
-        for name in known.untested
-        if EFFECTS[name].testable(known.line, together) is None
-        and (
-            name not in known.supposed
-            or distance(known.supposed[name].supposed, known.candidates[0], known.line, record) > LEAST_DIFFERENCE
-        )
-    )
+    found = {}
+    for name in known.untested:
+        if EFFECTS[name].testable(known.line, together) is None:
+            supposed = known.supposed.get(name)
+            truth = None if supposed is None else supposed.supposed
+            found[name] = math.inf if truth is None else distance(truth, known.candidates[0], known.line, record)
+    return {name: differs for name, differs in found.items() if differs > LEAST_DIFFERENCE}
 
 
 @dataclass(frozen=True, slots=True)

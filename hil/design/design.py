@@ -27,7 +27,7 @@ WORTH = 3.0
 """Factor by which an experiment has to change the odds to be worth driving (CONTRACT: design)."""
 
 NEARLY = 0.02
-"""Probability by which an experiment may tell less than another and be preferred for its shorter drive."""
+"""Probability by which an experiment may tell less than another and be preferred for what it shows, how clearly."""
 
 WIDE_INTERVAL = 0.1
 """Half of a 95 % interval over its value from which a parameter is not well known."""
@@ -154,7 +154,7 @@ def designed(
         chosen.planned,
         decides,
         _widths(known, chosen.planned),
-        chosen.shows,
+        tuple(chosen.shows),
         tuple(sorted(others, key=lambda each: -each[1])),
         refused,
     )
@@ -166,7 +166,7 @@ class _Judged:
 
     planned: Planned
     decides: Expected | None
-    shows: tuple[str, ...]
+    shows: Mapping[str, float]  # effects that are untested so far, with the expected difference of scores
     shortened: float  # factor by which wide intervals shorten; NaN where that is not asked
 
     def value(self, decides: Expected | None) -> float:
@@ -178,21 +178,26 @@ class _Judged:
 
 def _judged(known: Open, planned: Planned, aim: Aim) -> _Judged:
     if aim is Aim.PARAMETERS:
-        return _Judged(planned, None, (), _shortened(_widths(known, planned)))
+        return _Judged(planned, None, {}, _shortened(_widths(known, planned)))
     is_single = len(known.candidates) == 1 or known.is_decided
     decides = None if is_single else expected(known, planned.record)
     return _Judged(planned, decides, shown(known, planned.record), math.nan)
 
 
 def _best(judged: Sequence[_Judged]) -> _Judged:
-    """Return the one that tells most; of those that tell nearly as much, what shows most, in the shortest drive."""
+    """Return the one that tells most; of those that tell nearly as much, what shows most, most clearly."""
     values = [each.value(each.decides) for each in judged]
     enough = max(values) - NEARLY * (1.0 if judged[0].decides is not None else max(values))
     return max((each for each, value in zip(judged, values, strict=True) if value >= enough), key=_most_shown)
 
 
-def _most_shown(judged: _Judged) -> tuple[int, float]:
-    return len(judged.shows), -judged.planned.seconds
+def _most_shown(judged: _Judged) -> tuple[int, float, float]:
+    """Return how much an experiment shows, then how clearly in each second of its drive, then its shortness.
+
+    What is decided by likelihood has to be seen in a free run, too: of drives that decide alike the clearest is taken.
+    """
+    told = min(judged.shows.values(), default=0.0) if judged.decides is None else math.log(judged.decides.factor)
+    return len(judged.shows), told / judged.planned.seconds, -judged.planned.seconds
 
 
 def is_needed(known: Open, aim: Aim) -> bool:

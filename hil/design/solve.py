@@ -18,7 +18,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
 from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
-from hil.design.report import conditions, design_lines, in_words, obstacle, question_lines
+from hil.design.report import as_rival, conditions, design_lines, in_words, obstacle, question_lines
 from hil.design.solve_state import STATE, Driven, End, Odds, SolveState
 from hil.errors import UsageError
 from hil.orders.operator import Answer, StepChoice
@@ -220,7 +220,7 @@ def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
     if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
         return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
     if known.against:
-        rivals = ", ".join(f"{in_words(each.name)} ({each.probability:.2f})" for each in known.against)
+        rivals = "; ".join(f"{as_rival(each)} ({each.probability:.2f})" for each in known.against)
         return f"the verdict names {in_words(name_of(known.named or frozenset()))}, and the odds leave {rivals}"
     twins = {name: known.twins[name] for name in sorted(known.candidates[0].effects) if name in known.twins}
     return "; ".join(
