@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
 
@@ -106,16 +106,9 @@ class Design:
 
 
 def designed(
-    source: RigSource,
-    known: Open,
-    aim: Aim,
-    progress: Progress,
-    driven: Collection[str] = (),
-    ended_early: Mapping[str, str] = MappingProxyType({}),
+    source: RigSource, known: Open, aim: Aim, progress: Progress, left_out: Mapping[str, str] = MappingProxyType({})
 ) -> Design:
-    """Choose the next experiment for a rig; none that ended early, by name and what was met.
-
-    What was ``driven`` before may be driven again to decide, and shows no effect that it has not shown.
+    """Choose the next experiment for a rig; none of those left out, by name and why.
 
     To decide, it is one that decides between explanations, where any does; of these the one that shows most of what no
     recording so far could. Where none decides, or nothing is to be decided between, it is the one that shows most.
@@ -124,8 +117,9 @@ def designed(
     limits = Limits.of(rig)
     model = as_model(known.candidates[0], known.line)
     found: list[_Judged] = []
-    refused = dict(ended_early)
-    wanted = [each for each in candidates(rig, limits) if each[0] not in ended_early]
+    every = list(candidates(rig, limits))
+    refused = {name: left_out[name] for name, _ in every if name in left_out}
+    wanted = [each for each in every if each[0] not in refused]
     with threadpool_limits(1, user_api="blas"):
         for i, (name, table) in enumerate(wanted):
             progress(f"on paper: {name}", i / len(wanted))
@@ -134,13 +128,12 @@ def designed(
             except (InputError, CommandRefused, RunAborted) as error:
                 refused[name] = str(error)
                 continue
-            asked = replace(known, untested=()) if name in driven else known
-            found.append(_judged(asked, planned, aim))
+            found.append(_judged(known, planned, aim))
     progress("designed", 1.0)
     if not found:
         why = next(iter(refused.values()))
         raise NothingAllowed(
-            f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(wanted)} none passes its "
+            f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(every)} none passes its "
             f"limits, the first because: {why}"
         )
     decide = [each for each in found if each.decides is not None and each.decides.factor >= WORTH]
@@ -196,8 +189,8 @@ def _most_shown(judged: _Judged) -> tuple[int, float, float]:
 
     What is decided by likelihood has to be seen in a free run, too: of drives that decide alike the clearest is taken.
     """
-    told = min(judged.shows.values(), default=0.0) if judged.decides is None else math.log(judged.decides.factor)
-    return len(judged.shows), told / judged.planned.seconds, -judged.planned.seconds
+    clear = min(judged.shows.values(), default=0.0) if judged.decides is None else math.log(judged.decides.factor)
+    return len(judged.shows), clear / judged.planned.seconds, -judged.planned.seconds
 
 
 def is_needed(known: Open, aim: Aim) -> bool:

@@ -118,8 +118,8 @@ class Solving:
     def _designed(self, known: Open) -> Design | None:
         """Design the next experiment and say it; None where the rig's limits allow none."""
         try:
-            before = self._driven, self.state.ended_early
-            design = designed(self.source, known, Aim.DECIDE, self.progress, *before)
+            left_out = dict.fromkeys(self._driven, "it was driven before") | self.state.ended_early
+            design = designed(self.source, known, Aim.DECIDE, self.progress, left_out)
         except NothingAllowed as error:
             self.state.because = str(error)
             return None
