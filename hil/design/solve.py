@@ -194,7 +194,7 @@ class Solving:
         self._save()
         left_out = f", and leaves {name} out" if name in self.state.ended_early else ""
         self.say(f"{name} was ended early. {self.state.statement or 'Nothing was recorded whole so far.'}")
-        self.say(f"the next call continues from the {len(self._paths)} whole recordings{left_out}")
+        self.say(f"the next call continues from what was recorded whole ({len(self._paths)}){left_out}")
 
     def _ended(self, end: End) -> End:
         self.state.end = end

@@ -75,7 +75,7 @@ def test_what_left_its_band_of_speed_is_reported_and_left_out_by_the_next_call(
     job = stopped(SpeedBandLeft("speed band: -2.4 rad/s"))
     said = capsys.readouterr().out
     assert f"{OWN[1]} was ended early. Nothing is missing." in said
-    assert f"continues from the 1 whole recordings, and leaves {OWN[1]} out" in said
+    assert f"continues from what was recorded whole (1), and leaves {OWN[1]} out" in said
     assert job.state.because == f"{OWN[1]} was ended early: speed band: -2.4 rad/s"
     state = STATE.validate_python(job.document())
     job.state = state
