@@ -10,9 +10,14 @@ from threadpoolctl import threadpool_limits
 from estimator.design.open import Candidate, Open, name_of, precision_of
 from estimator.design.paper import LEAST_PROBABILITY, TEMPERED
 from estimator.design.untested import with_untested
+from estimator.diagnosis.assemble import moved_values
 from estimator.diagnosis.diagnose import SearchResult, answer
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
+from estimator.diagnosis.inference.decide import Judged
+from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, Progress, silent
+from estimator.diagnosis.inference.moves import additions
+from estimator.diagnosis.inference.trials import necessity
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.diagnosis.thresholds import Judging
@@ -46,27 +51,28 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
     """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
     search, judged = found.search, found.decision.judged
     best = judged.believed.hypothesis
-    within = max(Judging.ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     near = {
         each.effects: each
         for each in search.fits.ended.values()
         if each.is_plausible
-        and each.score - best.score < within
         and not _holds(each.effects, best.effects)
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
-    } | {best.effects: best}
-    behind = {effects: max(each.score - best.score, 0.0) for effects, each in near.items()}
+    }
+    near |= {each.effects: each for each in (*_larger(search.fits, judged), best)}
+    lowest = min(each.score for each in near.values())
+    behind = {effects: each.score - lowest for effects, each in near.items()} | {best.effects: 0.0}
+    within = max(Judging.ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     ordered: list[Hypothesis] = []
-    for effects in sorted(near, key=lambda effects: (behind[effects], effects != best.effects, sorted(effects))):
+    likely = (effects for effects in near if behind[effects] < within)
+    for effects in sorted(likely, key=lambda effects: (behind[effects], effects != best.effects, sorted(effects))):
         if len(ordered) < MOST_OPEN and not any(_are_twins(near[effects], other) for other in ordered):
             ordered.append(near[effects])
     weights = [math.exp(-0.5 * behind[each.effects] / TEMPERED) for each in ordered]
-    is_made = diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH)
     named = frozenset(each.name for each in diagnosis.effects if not EFFECTS[each.name].recognised)
     traces = frozenset(each.name for each in diagnosis.slight)
     total = sum(weights)
     candidates = tuple(
-        Candidate(name_of(each.effects), weight / total, each, precision_of(each))
+        Candidate(name_of(each.effects), weight / total, each, precision_of(each), moved_values(best, each.result))
         for each, weight in zip(ordered, weights, strict=True)
     )
     names = sorted({name for each in candidates for name in each.effects})
@@ -76,9 +82,31 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         candidates,
         twins if best.outputs == 1 else {},
         untested,
-        named=named if is_made else None,
+        named=named if diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH) else None,
         traces=traces,
     )
+
+
+def _larger(fits: Fits, judged: Judged) -> list[Hypothesis]:
+    """Return the verdict's set with one effect more, where that may well be there: no name yet, and no trace either.
+
+    The likelihood asks for it, and more than half of what the verdict leaves beyond the noise is gone with it, be that
+    too little to be sure of a name. A search ends where what is left is a trace at most: one counts that moves a value.
+    """
+    believed, noise = judged.believed, judged.noise
+    whole = believed.hypothesis
+    total = float(fits.trials.one(fits.nothing()).squares.sum())
+    asked_for = [each for each in additions(fits, whole) if whole.score - each.score >= Judging.LEAST_EVIDENCE]
+    trials = fits.trials.of([each for each in asked_for if each.is_plausible])
+    found = []
+    for each in trials:
+        needed = necessity(each, believed, noise)
+        is_trace = float(believed.squares.sum() - each.squares.sum()) < Judging.LEAST_SHARE * total
+        if needed.value < Judging.LEAST_NECESSITY or needed.least == 0.0 or any(one.beats(each) for one in trials):
+            continue
+        if not is_trace or moved_values(whole, each.hypothesis.result):
+            found.append(each.hypothesis)
+    return found
 
 
 def _are_twins(one: Hypothesis, other: Hypothesis) -> bool:

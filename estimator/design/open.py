@@ -24,6 +24,7 @@ class Candidate:
     probability: float  # among the hypotheses that are open, as the judge counts odds
     fit: Hypothesis  # of the recordings, by all of their outputs
     precision: FloatArray  # (S, S): What recordings say of its shared unknowns
+    moves: Mapping[str, float] = field(default_factory=dict)  # values outside the verdict's intervals: by what share
 
     @property
     def effects(self) -> Effects:

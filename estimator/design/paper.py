@@ -19,7 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.design.open import Candidate, Open
+from estimator.diagnosis.assemble import load_torques
 from estimator.diagnosis.covariance import Z95
+from estimator.diagnosis.inference.descent import covariance_of_innovations
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.hypotheses import GRADE
 from estimator.diagnosis.line.line import line_values
@@ -46,7 +48,10 @@ MOST_LOG_ODDS = 700.0  # largest logarithm of odds that is given: its exponentia
 
 
 def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
-    """Return a hypothesis as a model to drive on paper; its events last throughout, a road stays level."""
+    """Return a hypothesis as a model to drive on paper; its events last throughout.
+
+    The load is the constant torque of the recording that knows it best: what pushed the vehicle will push it again.
+    """
     result = candidate.fit.result
     values = line_values(result)
     always = {"from_s": EffectValue(0.0), "to_s": EffectValue(1e9)}
@@ -57,7 +62,9 @@ def as_model(candidate: Candidate, line: DrivelineModel) -> DrivelineModel:
         for name in candidate.effects - {GRADE}
     }
     given = {name: each.at(values[name]) for name, each in line.parameters.items()}
-    return replace(line, parameters=given, effects={**line.effects, **added})
+    loads = load_torques(result, covariance_of_innovations(candidate.fit), line).values()
+    load = min(loads, key=lambda each: each.ci95[1] - each.ci95[0]).value
+    return replace(line, parameters=given, effects={**line.effects, **added}, load=load)
 
 
 def _on_paper(candidate: Candidate, line: DrivelineModel, records: Sequence[Record]) -> FitResult:
@@ -162,21 +169,20 @@ def expected(known: Open, record: Record) -> Expected:
     return Expected(gained, float(probability @ (1.0 / rivals.sum(axis=1))))
 
 
-def shown(known: Open, record: Record) -> tuple[str, ...]:
+def shown(known: Open, record: Record) -> dict[str, float]:
     """Return the effects that no recording so far shows or excludes, and all of them with an experiment on paper do.
 
-    One that has a size to suppose has to change the odds by as much as a diagnosis asks for.
+    Each with its expected difference of scores, which has to change the odds by as much as a diagnosis asks for;
+    infinite where the effect has no size to suppose.
     """
     together = [*known.records, record]
-    return tuple(
-        name
-        for name in known.untested
-        if EFFECTS[name].testable(known.line, together) is None
-        and (
-            name not in known.supposed
-            or distance(known.supposed[name].supposed, known.candidates[0], known.line, record) > LEAST_DIFFERENCE
-        )
-    )
+    found = {}
+    for name in known.untested:
+        if EFFECTS[name].testable(known.line, together) is None:
+            supposed = known.supposed.get(name)
+            truth = None if supposed is None else supposed.supposed
+            found[name] = math.inf if truth is None else distance(truth, known.candidates[0], known.line, record)
+    return {name: differs for name, differs in found.items() if differs > LEAST_DIFFERENCE}
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,7 @@ def solve(
     from hil.orders.order import RigSource
     from hil.orders.runner import Conditions, Runner
     from hil.recording import read_records
+    from hil.recording.recordings import read_facts
 
     hold(out)
     read_rig(rig)  # names every fault of the file by the line
@@ -81,6 +82,7 @@ def solve(
             keep_in(out),
             lambda line: console.print(line, markup=False, soft_wrap=not console.is_terminal),
             bar.show,
+            done=[named for path in given if (named := read_facts(path).metadata.get("experiment"))],
         )
         job.run()
     if as_json:

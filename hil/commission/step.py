@@ -78,7 +78,7 @@ class StepContext:
         known = self.state.steps[step].run(order.name)
         if known is not None and known.prbs_nm in (0.0, order.prbs.get("amplitude_nm", known.prbs_nm)):
             return known
-        return self.runner.run(step, order, self.model(), self.rolling_rad_s(), lambda run: self.note(step, run))
+        return self.runner.run(step, order, [self.model()], self.rolling_rad_s(), lambda run: self.note(step, run))
 
     def note(self, step: str, run: RunRecord) -> None:
         """Enter a run in the record of a step, and save the state."""

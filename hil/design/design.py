@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -26,7 +27,7 @@ WORTH = 3.0
 """Factor by which an experiment has to change the odds to be worth driving (CONTRACT: design)."""
 
 NEARLY = 0.02
-"""Probability by which an experiment may tell less than another and be preferred for its shorter drive."""
+"""Probability by which an experiment may tell less than another and be preferred for what it shows, how clearly."""
 
 WIDE_INTERVAL = 0.1
 """Half of a 95 % interval over its value from which a parameter is not well known."""
@@ -104,8 +105,10 @@ class Design:
         return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE_INTERVAL)
 
 
-def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> Design:
-    """Choose the next experiment for a rig.
+def designed(
+    source: RigSource, known: Open, aim: Aim, progress: Progress, left_out: Mapping[str, str] = MappingProxyType({})
+) -> Design:
+    """Choose the next experiment for a rig; none of those left out, by name and why.
 
     To decide, it is one that decides between explanations, where any does; of these the one that shows most of what no
     recording so far could. Where none decides, or nothing is to be decided between, it is the one that shows most.
@@ -114,8 +117,9 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
     limits = Limits.of(rig)
     model = as_model(known.candidates[0], known.line)
     found: list[_Judged] = []
-    refused: dict[str, str] = {}
-    wanted = list(candidates(rig, limits))
+    every = list(candidates(rig, limits))
+    refused = {name: left_out[name] for name, _ in every if name in left_out}
+    wanted = [each for each in every if each[0] not in refused]
     with threadpool_limits(1, user_api="blas"):
         for i, (name, table) in enumerate(wanted):
             progress(f"on paper: {name}", i / len(wanted))
@@ -129,7 +133,7 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
     if not found:
         why = next(iter(refused.values()))
         raise NothingAllowed(
-            f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(wanted)} none passes its "
+            f"rig {rig.name!r}: expected an experiment that it may drive, got none: of {len(every)} none passes its "
             f"limits, the first because: {why}"
         )
     decide = [each for each in found if each.decides is not None and each.decides.factor >= WORTH]
@@ -143,7 +147,7 @@ def designed(source: RigSource, known: Open, aim: Aim, progress: Progress) -> De
         chosen.planned,
         decides,
         _widths(known, chosen.planned),
-        chosen.shows,
+        tuple(chosen.shows),
         tuple(sorted(others, key=lambda each: -each[1])),
         refused,
     )
@@ -155,7 +159,7 @@ class _Judged:
 
     planned: Planned
     decides: Expected | None
-    shows: tuple[str, ...]
+    shows: Mapping[str, float]  # effects that are untested so far, with the expected difference of scores
     shortened: float  # factor by which wide intervals shorten; NaN where that is not asked
 
     def value(self, decides: Expected | None) -> float:
@@ -167,21 +171,26 @@ class _Judged:
 
 def _judged(known: Open, planned: Planned, aim: Aim) -> _Judged:
     if aim is Aim.PARAMETERS:
-        return _Judged(planned, None, (), _shortened(_widths(known, planned)))
+        return _Judged(planned, None, {}, _shortened(_widths(known, planned)))
     is_single = len(known.candidates) == 1 or known.is_decided
     decides = None if is_single else expected(known, planned.record)
     return _Judged(planned, decides, shown(known, planned.record), math.nan)
 
 
 def _best(judged: Sequence[_Judged]) -> _Judged:
-    """Return the one that tells most; of those that tell nearly as much, what shows most, in the shortest drive."""
+    """Return the one that tells most; of those that tell nearly as much, what shows most, most clearly."""
     values = [each.value(each.decides) for each in judged]
     enough = max(values) - NEARLY * (1.0 if judged[0].decides is not None else max(values))
     return max((each for each, value in zip(judged, values, strict=True) if value >= enough), key=_most_shown)
 
 
-def _most_shown(judged: _Judged) -> tuple[int, float]:
-    return len(judged.shows), -judged.planned.seconds
+def _most_shown(judged: _Judged) -> tuple[int, float, float]:
+    """Return how much an experiment shows, then how clearly in each second of its drive, then its shortness.
+
+    What is decided by likelihood has to be seen in a free run, too: of drives that decide alike the clearest is taken.
+    """
+    clear = min(judged.shows.values(), default=0.0) if judged.decides is None else math.log(judged.decides.factor)
+    return len(judged.shows), clear / judged.planned.seconds, -judged.planned.seconds
 
 
 def is_needed(known: Open, aim: Aim) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from estimator.design.open import Open, name_of
+from estimator.design.open import Candidate, Open, name_of
 from estimator.design.paper import Width
 from estimator.physics.catalogue import title_of
 from hil.design.design import WORTH, Aim, Design, Planned
@@ -34,15 +34,17 @@ def in_words(candidate: str) -> str:
 def question_lines(known: Open) -> Iterator[str]:
     """Say what recordings leave open."""
     first, *rivals = known.candidates
-    if not rivals:
+    if known.named is None:
+        yield f"No explanation leaves only noise; the best so far: {in_words(first.name)}."
+    elif not rivals:
         yield f"One explanation is left: {in_words(first.name)}."
-    else:
+    if rivals:
         yield "The recordings leave open, with the odds of each among these:"
         yield from (f"  {each.name:40} {each.probability:.3f}" for each in known.candidates)
     for each in known.against if known.named is not None else ():
         yield (
             f"  The verdict names {in_words(name_of(known.named or frozenset()))}; with odds of "
-            f"{each.probability:.3f} it is {in_words(each.name)}: not decided."
+            f"{each.probability:.3f} it is {as_rival(each)}: not decided."
         )
     if known.untested:
         yield f"  Neither found nor excluded so far: {', '.join(map(title_of, known.untested))}."
@@ -59,8 +61,18 @@ def conditions(known: Open) -> Iterator[str]:
     for name, each in known.supposed.items():
         if each.moves:
             size = ", ".join(f"{parameter} = {value:.3g}" for parameter, value in each.size.items())
-            moved = ", ".join(f"{value} by {100.0 * share:+.2g} %" for value, share in each.moves.items())
-            yield f"as if without {title_of(name)}, which the recordings do not show: {size} would move {moved}"
+            moved = _moved(each.moves, f": {size} would move ")
+            yield f"as if without {title_of(name)}, which the recordings do not show{moved}"
+
+
+def as_rival(candidate: Candidate) -> str:
+    """Return what another explanation is, and by how much it would move the values that are reported."""
+    return in_words(candidate.name) + _moved(candidate.moves, ", which would move ")
+
+
+def _moved(moves: Mapping[str, float], said: str) -> str:
+    """Say by how much values move, after some words; nothing where none does."""
+    return said + ", ".join(f"{value} by {100.0 * share:+.2g} %" for value, share in moves.items()) if moves else ""
 
 
 def design_lines(known: Open, design: Design) -> Iterator[str]:

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from estimator.design.left_open import left_open
 from estimator.design.open import Open, name_of
+from estimator.design.paper import as_model
 from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.physics.catalogue import title_of
+from estimator.physics.driveline import Load
+from estimator.physics.model import DrivelineModel
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
-from hil.config.rig_file import Rig
 from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
-from hil.design.report import conditions, design_lines, in_words, obstacle, question_lines
+from hil.design.report import as_rival, conditions, design_lines, in_words, obstacle, question_lines
 from hil.design.solve_state import STATE, Driven, End, Odds, SolveState
 from hil.errors import UsageError
 from hil.orders.operator import Answer, StepChoice
 from hil.orders.order import Order, RigSource, as_table
-from hil.orders.runner import Runner, RunRecord, now_utc
+from hil.orders.runner import Runner, RunRecord, SpeedBandLeft, now_utc
 from hil.provenance import provenance
 from hil.recording import read_records
 from hil.report.diagnosis_files import publish_diagnosis
@@ -53,6 +55,7 @@ class Solving:
     say: Callable[[str], None]  # shows a line to the operator
     progress: Callable[[str, float], None]  # stage, and the share of it that is done
     note: Callable[[RunRecord], None] = lambda _: None  # called after each run, also of one that was ended early
+    done: Collection[str] = ()  # experiments of the rig file that the given recordings are of
 
     def run(self) -> End:
         """Continue until it ends; what ends it is in the state."""
@@ -60,7 +63,7 @@ class Solving:
             self.say(f"decided before: {self.state.statement}")
             return End.DECIDED
         self.state.end, self.state.because = None, ""
-        if not self.given and not self.state.driven and (end := self._drive(*_first(self.source.rig()))):
+        if not self.given and not self.state.driven and (end := self._drive(*self._first())):
             return self._ended(end)
         while True:
             known, diagnosis = self._diagnosed()
@@ -69,7 +72,7 @@ class Solving:
                 self.state.because, self.state.provided = "", [*conditions(known)]
             elif found is End.NOTHING_DECIDES:
                 self.state.because = self.state.because or _undecidable(known, diagnosis)
-            end = found if isinstance(found, End) else self._drive(*found)
+            end = found if isinstance(found, End) else self._drive(*found, known)
             if end is not None:
                 return self._ended(end)
 
@@ -84,18 +87,39 @@ class Solving:
             design = self._designed(known)
             if design is not None and design.is_worth_driving:
                 return design.planned.name, dict(design.planned.table), design
-        if not self.given and not known.named:
-            done = {each.name for each in self.state.driven}
-            for name, table in self.source.rig().experiments.items():
-                if name not in done:
+        if not known.named:
+            left = {name: table for name, table in self.source.rig().experiments.items() if name not in self._driven}
+            for name, table in left.items():
+                if name not in self.state.ended_early:
                     self.say(f"nothing has a name so far: {name} of the rig file is still to be driven")
                     return name, as_table(table), None
+            if left:
+                self.state.because = f"{', '.join(left)} of the rig file ended early"
+                return End.NOTHING_DECIDES
         return End.DECIDED if known.is_decided else End.NOTHING_DECIDES
+
+    @property
+    def _driven(self) -> set[str]:
+        """Experiments of which there is a whole recording."""
+        return {*self.done, *(each.name for each in self.state.driven)}
+
+    def _first(self) -> tuple[str, dict[str, Any]]:
+        """Return the first of the rig file that did not end early: what is driven where nothing was recorded."""
+        rig = self.source.rig()
+        if not rig.experiments:
+            raise UsageError(
+                f"rig {rig.name!r}: expected an experiment to begin with, or recordings, got neither. Add "
+                "[experiments.…] to the rig file; see examples/rig.toml."
+            )
+        own = list(rig.experiments.items())
+        name, table = next((each for each in own if each[0] not in self.state.ended_early), own[0])
+        return name, as_table(table)
 
     def _designed(self, known: Open) -> Design | None:
         """Design the next experiment and say it; None where the rig's limits allow none."""
         try:
-            design = designed(self.source, known, Aim.DECIDE, self.progress)
+            left_out = dict.fromkeys(self._driven, "it was driven before") | self.state.ended_early
+            design = designed(self.source, known, Aim.DECIDE, self.progress, left_out)
         except NothingAllowed as error:
             self.state.because = str(error)
             return None
@@ -123,10 +147,11 @@ class Solving:
             self.say(line)
         return known, diagnosis
 
-    def _drive(self, name: str, table: Any, design: Design | None = None) -> End | None:
+    def _drive(self, name: str, table: Any, design: Design | None = None, known: Open | None = None) -> End | None:
         """Drive an experiment if there is time and the operator agrees; what was driven whole is in the state."""
         order = Order(f"next_{len(self.state.driven) + 1}", dict(table), least_margin_rad_s=LEAST_MARGIN_RAD_S)
-        prediction = self.runner.predict(order, self.file.model, self.rolling_rad_s)
+        lines = [*_lines(known, design), self.file.model]
+        prediction = self.runner.predictions(order, lines, self.rolling_rad_s)[0]
         if self.state.vehicle_s + prediction.seconds > self.most_vehicle_s:
             left_s = max(self.most_vehicle_s - self.state.vehicle_s, 0.0)
             self.state.because = f"{name} needs the vehicle for {prediction.seconds:.0f} s, left are {left_s:.0f} s"
@@ -140,7 +165,11 @@ class Solving:
         if answer.what is not StepChoice.GO:
             self.state.because = answer.because
             return End.DECLINED
-        run = self.runner.run(STEP, order, self.file.model, self.rolling_rad_s, self.note)
+        try:
+            run = self.runner.run(STEP, order, lines, self.rolling_rad_s, self.note)
+        except BaseException as error:
+            self._ended_early(name, error)
+            raise
         self.rolling_rad_s = run.last_rad_s
         decides = None if design is None else design.decides
         self.state.driven.append(
@@ -156,6 +185,16 @@ class Solving:
         )
         self._save()
         return None
+
+    def _ended_early(self, name: str, error: BaseException) -> None:
+        """Keep what is known, and say it; what left its band would leave it again."""
+        if isinstance(error, SpeedBandLeft):
+            self.state.ended_early[name] = str(error)
+        self.state.because = f"{name} was ended early: {error or 'interrupted'}"
+        self._save()
+        left_out = f", and leaves {name} out" if name in self.state.ended_early else ""
+        self.say(f"{name} was ended early. {self.state.statement or 'Nothing was recorded whole so far.'}")
+        self.say(f"the next call continues from what was recorded whole ({len(self._paths)}){left_out}")
 
     def _ended(self, end: End) -> End:
         self.state.end = end
@@ -181,7 +220,7 @@ def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
     if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
         return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
     if known.against:
-        rivals = ", ".join(f"{in_words(each.name)} ({each.probability:.2f})" for each in known.against)
+        rivals = "; ".join(f"{as_rival(each)} ({each.probability:.2f})" for each in known.against)
         return f"the verdict names {in_words(name_of(known.named or frozenset()))}, and the odds leave {rivals}"
     twins = {name: known.twins[name] for name in sorted(known.candidates[0].effects) if name in known.twins}
     return "; ".join(
@@ -189,12 +228,10 @@ def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
     )
 
 
-def _first(rig: Rig) -> tuple[str, dict[str, Any]]:
-    """Return the rig file's first experiment: what it drives where nothing was recorded."""
-    if not rig.experiments:
-        raise UsageError(
-            f"rig {rig.name!r}: expected an experiment to begin with, or recordings, got neither. Add [experiments.…] "
-            "to the rig file; see examples/rig.toml."
-        )
-    name, table = next(iter(rig.experiments.items()))
-    return name, as_table(table)
+def _lines(known: Open | None, design: Design | None) -> list[DrivelineModel]:
+    """Return the lines that the vehicle may be, the most probable first, each as loaded as it was and with no load."""
+    if known is None:
+        return []
+    supposed = () if design is None else (known.supposed[name] for name in design.shows if name in known.supposed)
+    loaded = [as_model(each, known.line) for each in (*known.candidates, *(each.supposed for each in supposed))]
+    return [*loaded, *(replace(each, load=Load.OWN) for each in loaded)]

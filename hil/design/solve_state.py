@@ -60,6 +60,7 @@ class SolveState:
     rig_sha256: str  # of what the rig file says
     model_sha256: str  # of the model file; another one is refused
     driven: list[Driven] = field(default_factory=list)  # in the order of driving
+    ended_early: dict[str, str] = field(default_factory=dict)  # left their band of speed: name, and what was met
     odds: list[Odds] = field(default_factory=list)  # after each
     end: End | None = None  # None: under way, or interrupted
     because: str = ""  # what kept it from a decision: a limit, the time, the operator's reason

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -13,6 +13,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat
 
+from drivers.errors import CommandRefused
+from estimator.physics.driveline import Load
+from estimator.physics.layout import flat
 from estimator.physics.model import DrivelineModel, Parameter, Structure
 from estimator.physics.simulate import Stepper
 from estimator.signals.record import FloatArray
@@ -104,8 +107,12 @@ def rigid_model(rig: Rig) -> DrivelineModel:
 
 
 def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0) -> Prediction:
-    """Predict a run of one experiment of a rig file, from standstill or rolling at a speed [rad/s]."""
-    vehicle = Stepper(model, rig.period_s, speed_rad_s=speed_rad_s)
+    """Predict a run of one experiment of a rig file, from standstill or rolling at a speed [rad/s].
+
+    The load torque is the model's where it says one, else none.
+    """
+    load_nm = 0.0 if isinstance(model.load, Load) else model.load
+    vehicle = Stepper(model, rig.period_s, load_nm, speed_rad_s)
     ranges, cycles = Ranges(), 0
     torque: list[tuple[float, float]] = []
     course: list[float] = []
@@ -126,6 +133,10 @@ def predict(rig: Rig, name: str, model: DrivelineModel, speed_rad_s: float = 0.0
         each_nm=np.array(torque).reshape(-1, 2),
         course_rad_s=np.array(course),
     )
+
+
+class SpeedBandLeft(RunAborted):
+    """The vehicle moved otherwise than was predicted of it: driven again, the same experiment would end alike."""
 
 
 @dataclass(slots=True)
@@ -155,12 +166,29 @@ class WithinBand:
             self.high_rad_s = max(self.high_rad_s, speed_rad_s + self.margin_rad_s)
         smooth_rad_s = self._speed.update(speed_rad_s)
         if not self.low_rad_s <= smooth_rad_s <= self.high_rad_s:
-            raise RunAborted(
+            raise SpeedBandLeft(
                 f"speed band: the speed is {smooth_rad_s:.1f} rad/s, expected {self.low_rad_s:.1f} to "
                 f"{self.high_rad_s:.1f} rad/s, what was predicted and a margin. The run was ended at zero torque. Look "
                 "for a grade, a wrong sign, or an inertia in the rig file that is far off."
             )
         return self.experiment.torque(time_s, speed_rad_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """What a run's speed is kept between [rad/s]."""
+
+    low_rad_s: float  # lower end
+    high_rad_s: float  # upper end
+    margin_rad_s: float  # of this, how far beyond what was predicted
+
+    @classmethod
+    def around(cls, predictions: Sequence[Ranges], least_rad_s: float) -> Band:
+        """Return the band that holds for each of these predictions, with a margin of at least so much."""
+        low = min(each.speed_rad_s.low for each in predictions)
+        high = max(each.speed_rad_s.high for each in predictions)
+        margin = margin_rad_s(low, high, least_rad_s)
+        return cls(low - margin, high + margin, margin)
 
 
 def margin_rad_s(low_rad_s: float, high_rad_s: float, least_rad_s: float) -> float:
@@ -211,22 +239,42 @@ class Runner:
         """Predict an order for a vehicle that rolls at a speed [rad/s]; the same one is predicted once."""
         rig, text = self.source.ordered(order)
         start_rad_s = 0.0 if order.from_standstill else round(speed_rad_s, 2)
-        key = (text, model.structure, *model.values().values(), start_rad_s)
+        key = (text, model.structure, flat(model).tobytes(), start_rad_s)
         if key not in self._predicted:
             self._predicted[key] = predict(rig, order.name, model, start_rad_s)
         return self._predicted[key]
+
+    def predictions(self, order: Order, lines: Sequence[DrivelineModel], speed_rad_s: float) -> list[Prediction]:
+        """Predict an order for each line that the vehicle may be; left out is one with which it would end early.
+
+        Where it would with each of them, the error of the first is raised.
+        """
+        made: list[Prediction] = []
+        refused: list[RunAborted | CommandRefused] = []
+        for line in lines:
+            try:
+                made.append(self.predict(order, line, speed_rad_s))
+            except (RunAborted, CommandRefused) as error:
+                refused.append(error)
+        if not made:
+            raise refused[0]
+        return made
 
     def run(
         self,
         step: str,
         order: Order,
-        model: DrivelineModel,
+        lines: Sequence[DrivelineModel],
         speed_rad_s: float,
         note: Callable[[RunRecord], None],
     ) -> RunRecord:
-        """Drive an order, record it, and return its record; ``note`` is given that of a run that is ended early too."""
+        """Drive an order, record it, and return its record; ``note`` is given that of a run that is ended early too.
+
+        The band of speed holds for each line that the vehicle may be, the most probable first.
+        """
         rig, text = self.source.ordered(order)
-        prediction = self.predict(order, model, speed_rad_s)
+        predictions = self.predictions(order, lines, speed_rad_s)
+        prediction, band = predictions[0], Band.around(predictions, order.least_margin_rad_s)
         path, seen = self._free_path(step, order), _Measured()
 
         def record(whole: bool) -> RunRecord:
@@ -244,7 +292,7 @@ class Runner:
             )
 
         try:
-            self._drive(rig, text, order, prediction, path, seen, step)
+            self._drive(rig, text, order, band, path, seen, step)
         except BaseException as error:
             note(record(False))
             _enter_ended(path, error)
@@ -254,12 +302,10 @@ class Runner:
         register_run(path)
         return run
 
-    def _drive(
-        self, rig: Rig, text: str, order: Order, prediction: Prediction, path: Path, seen: _Measured, step: str
-    ) -> None:
+    def _drive(self, rig: Rig, text: str, order: Order, band: Band, path: Path, seen: _Measured, step: str) -> None:
         pacer, stop = self.conditions.pacer(rig), StopRequest()
         timing = RunTiming(pacer.period_ns)
-        plan = _banded(plan_run(rig, order.name), prediction, order.least_margin_rad_s)
+        plan = _banded(plan_run(rig, order.name), band)
         metadata = run_metadata(self.source.path, order.name) | {
             RIG_TEXT: text,
             RIG_CHECKSUM: text_sha256(text),
@@ -292,10 +338,9 @@ class Runner:
             number += 1
 
 
-def _banded(plan: Plan, prediction: Prediction, least_margin_rad_s: float) -> Plan:
-    low, high = prediction.speed_rad_s.low, prediction.speed_rad_s.high
-    margin = margin_rad_s(low, high, least_margin_rad_s)
-    return replace(plan, experiment=WithinBand(plan.experiment, low - margin, high + margin, margin, plan.period_s))
+def _banded(plan: Plan, band: Band) -> Plan:
+    limits = band.low_rad_s, band.high_rad_s, band.margin_rad_s
+    return replace(plan, experiment=WithinBand(plan.experiment, *limits, plan.period_s))
 
 
 def _enter_ended(path: Path, error: BaseException) -> None:

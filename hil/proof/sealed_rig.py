@@ -63,12 +63,18 @@ class Challenge:
 
 
 def draw_challenge(
-    seed: int, effect: str | None = None, faults: Sequence[str] = (), *, on_rollers: bool = False
+    seed: int,
+    effect: str | None = None,
+    faults: Sequence[str] = (),
+    *,
+    on_rollers: bool = False,
+    moments_after_s: float = 0.0,
 ) -> Challenge:
     """Draw a challenge; without an effect one of `CONCEALED` is drawn.
 
     The rolling resistance of the truth is a constant torque, as while the bus rolls forward. At standstill it would
-    push the bus backwards; rollers that make up for it take it away.
+    push the bus backwards; rollers that make up for it take it away. Moments of events and courses over time count from
+    ``moments_after_s``: they are drawn for a recording, which begins after the way to its speed.
     """
     name = choose_effect(CONCEALED, seed) if effect is None else effect
     specimen = draw_specimen(name, seed)
@@ -76,7 +82,8 @@ def draw_challenge(
     if on_rollers:
         physics = physics._replace(load_torque_nm=0.0)
     truth = {**specimen.truth(), "faults": list(faults)}
-    return Challenge(specimen, TruthDriveline(physics), tuple(faults), seal(truth))
+    plant = TruthDriveline(physics, still_s=moments_after_s)
+    return Challenge(specimen, plant, tuple(faults), seal(truth))
 
 
 def compile_truth(challenge: Challenge) -> None:
@@ -92,6 +99,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--effect", help=f"conceal this one; otherwise one of {', '.join(CONCEALED)} is drawn")
     parser.add_argument("--fault", action="append", default=[], metavar="SPEC", help="as hil sim takes it; repeatable")
     parser.add_argument("--on-rollers", action="store_true", help="without rolling resistance: it begins at standstill")
+    parser.add_argument(
+        "--moments-after-s", type=float, default=0.0, metavar="S", help="when moments drawn for a recording count from"
+    )
     parser.add_argument("--rig", type=Path, default=RIG_FILE, help="rig file the simulated devices agree with")
     parser.add_argument("--bus", default="ws://127.0.0.1:0/", help="where the CAN bus is served")
     parser.add_argument("--modbus", default="127.0.0.1:0", help="where the PLC is served")
@@ -129,7 +139,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with suppress(KeyboardInterrupt):
         try:
             rig = read_rig(options.rig)
-            challenge = draw_challenge(options.seed, options.effect, options.fault, on_rollers=options.on_rollers)
+            drawn = {"on_rollers": options.on_rollers, "moments_after_s": options.moments_after_s}
+            challenge = draw_challenge(options.seed, options.effect, options.fault, **drawn)
             if options.model is not None:
                 options.model.write_text(model_toml(challenge.specimen), encoding="utf-8")
             serve(challenge, rig, options.bus, options.modbus, sys.stdin, sys.stdout)

@@ -38,6 +38,10 @@ ALIKE = {
 
 EFFECTS = [(alike, effect) for alike, effects in ALIKE.items() for effect in effects]
 
+MOMENTS_AFTER_S = 20.0
+"""When moments count from [s]: some 20 s pass on the way to the first recording. A payload that has changed by then, or
+a clutch that has closed, is in no recording."""
+
 WAYS = ("designed", "fixed")
 MOST_DRIVEN = 3
 MOST_VEHICLE_S = 600.0
@@ -82,7 +86,8 @@ def answered(seed: int, effort: str) -> Row:
         folder = Path(place)
         model = folder / "nominal.toml"
         solve = ["solve", "rig.toml", "--model", model.name, "--effort", effort, "--pace", "fast", "--yes"]
-        with sealed_process("--seed", str(seed), "--effect", effect, "--model", str(model)) as sealed:
+        drawn = ("--seed", str(seed), "--effect", effect, "--moments-after-s", str(MOMENTS_AFTER_S))
+        with sealed_process(*drawn, "--model", str(model)) as sealed:
             (folder / "rig.toml").write_text(rig_text(sealed), encoding="utf-8")
             run_hil([*solve, "--vehicle-s", str(MOST_VEHICLE_S), "--out", "designed"], folder, LIMIT_S)
             for name in EXPERIMENTS:

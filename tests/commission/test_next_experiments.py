@@ -45,6 +45,7 @@ class World:
         monkeypatch.setattr(solve, "left_open", self._left_open)
         monkeypatch.setattr(solve, "designed", self._designed)
         monkeypatch.setattr(solve, "design_lines", lambda *_: [])
+        monkeypatch.setattr(solve, "_lines", lambda *_: [])
         monkeypatch.setattr(solve, "publish_diagnosis", self._publish)
 
     def diagnosed(self, verdict: str, *alike: str) -> None:
@@ -83,7 +84,7 @@ class World:
         return Talk(ask)
 
     def _job(self) -> StepContext:
-        runner: Any = SimpleNamespace(folder=self.folder, predict=self._predict, run=self._run)
+        runner: Any = SimpleNamespace(folder=self.folder, predictions=self._predictions, run=self._run)
         return StepContext(SOURCE, SOURCE.rig(), self.state, runner, None, 0.1, True, self.said.append, lambda *_: None)
 
     def _recorded(self, step: str, name: str, measured: dict[str, Any], whole: bool = True) -> RunRecord:
@@ -91,11 +92,11 @@ class World:
         path.write_text(name, encoding="utf-8")
         return RunRecord(name, f"runs/{path.name}", whole, 5.0, {}, measured, last_rad_s=3.0)
 
-    def _predict(self, *_: object) -> Any:
+    def _predictions(self, *_: object) -> list[Any]:
         nothing = SimpleNamespace(low=0.0, high=0.0)
-        return SimpleNamespace(seconds=5.0, torque_m1_nm=nothing, torque_m2_nm=nothing, speed_rad_s=nothing)
+        return [SimpleNamespace(seconds=5.0, torque_m1_nm=nothing, torque_m2_nm=nothing, speed_rad_s=nothing)]
 
-    def _run(self, step: str, order: Order, model: object, rolling: float, note: Callable[[RunRecord], None]) -> Any:
+    def _run(self, step: str, order: Order, lines: object, rolling: float, note: Callable[[RunRecord], None]) -> Any:
         self.driven.append(order.name)
         run = self._recorded(step, order.name, {}, whole=not self.fails)
         note(run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -9,19 +10,22 @@ from typing import Any, cast
 import pytest
 
 from hil.design.solve import Solving
-from hil.design.solve_state import Driven, End, SolveState
+from hil.design.solve_state import STATE, Driven, End, SolveState
+from hil.orders.operator import Answer, StepChoice
+from hil.orders.runner import SpeedBandLeft
 from tests.design.test_candidates import SOURCE
 
 OWN = list(SOURCE.rig().experiments)
 
 
-def solving(driven: list[str], given: list[Path], most_vehicle_s: float = 600.0) -> Solving:
-    """A search that has driven so much and neither runner nor operator."""
+def solving(driven: list[str], given: list[Path], most_vehicle_s: float = 600.0, done: Sequence[str] = ()) -> Solving:
+    """A search that has driven so much and neither runner nor operator; ``done`` is what the given recordings are."""
     state = SolveState("hil.solve/1", "", "", [Driven(name, {}, "x.csv", 40.0, 0.0, None, None) for name in driven])
     nobody: Any = SimpleNamespace()
     return Solving(
         *(Path(), SOURCE, nobody, Path(), nobody, nobody, state, given, "quick", most_vehicle_s, 0.0),
         *(print, print, lambda *_: None),
+        done=done,
     )
 
 
@@ -38,14 +42,56 @@ def test_nothing_missing_is_decided_when_the_rigs_own_experiments_are_all_driven
     assert solving(OWN, [])._next(decided_on()) is End.DECIDED
 
 
-@pytest.mark.parametrize(("effects", "given"), [(("backlash",), []), ((), [Path("a.csv")])])
-def test_a_name_and_recordings_that_were_given_decide(effects: tuple[str, ...], given: list[Path]) -> None:
-    assert solving(OWN[:1], given)._next(decided_on(*effects)) is End.DECIDED
+def test_a_name_decides_whatever_was_driven() -> None:
+    assert solving(OWN[:1], [])._next(decided_on("backlash")) is End.DECIDED
+
+
+def test_recordings_that_were_given_count_as_the_experiments_that_they_are_of() -> None:
+    assert solving([], [Path("a.csv")], done=OWN)._next(decided_on()) is End.DECIDED
+    assert solving([], [Path("a.csv")])._next(decided_on())[:1] == (OWN[0],)  # type: ignore[index]
+
+
+def stopped(error: BaseException) -> Solving:
+    """A search in which the first experiment of the rig file was driven whole, and the second one ended early."""
+    job = solving(OWN[:1], [])
+    job.state.statement = "Nothing is missing."
+    job.file, job.keep = cast("Any", SimpleNamespace(model=None)), lambda _document: None
+    job.may_command = lambda _name: Answer(StepChoice.GO)
+
+    def run(*_: object) -> None:
+        raise error
+
+    ranges = {name: SimpleNamespace(low=0.0, high=1.0) for name in ("torque_m1_nm", "torque_m2_nm", "speed_rad_s")}
+    prediction = SimpleNamespace(seconds=20.0, **ranges)
+    job.runner = cast("Any", SimpleNamespace(predictions=lambda *_: [prediction], run=run, folder=Path()))
+    with pytest.raises(type(error)):
+        job._drive(OWN[1], {})
+    return job
+
+
+def test_what_left_its_band_of_speed_is_reported_and_left_out_by_the_next_call(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    job = stopped(SpeedBandLeft("speed band: -2.4 rad/s"))
+    said = capsys.readouterr().out
+    assert f"{OWN[1]} was ended early. Nothing is missing." in said
+    assert f"continues from what was recorded whole (1), and leaves {OWN[1]} out" in said
+    assert job.state.because == f"{OWN[1]} was ended early: speed band: -2.4 rad/s"
+    state = STATE.validate_python(job.document())
+    job.state = state
+    assert job._next(decided_on())[:1] == (OWN[2],)  # type: ignore[index]
+    job.state.driven += [Driven(name, {}, "x.csv", 40.0, 0.0, None, None) for name in OWN[2:]]
+    assert job._next(decided_on()) is End.NOTHING_DECIDES
+    assert OWN[1] in job.state.because
+
+
+def test_what_was_interrupted_is_driven_again() -> None:
+    assert stopped(KeyboardInterrupt())._next(decided_on())[:1] == (OWN[1],)  # type: ignore[index]
 
 
 def test_no_experiment_goes_beyond_the_vehicles_time() -> None:
     job = solving(OWN[:1], [], most_vehicle_s=50.0)
-    job.runner = cast("Any", SimpleNamespace(predict=lambda *_: SimpleNamespace(seconds=20.0)))
+    job.runner = cast("Any", SimpleNamespace(predictions=lambda *_: [SimpleNamespace(seconds=20.0)]))
     job.file = cast("Any", SimpleNamespace(model=None))
     assert job._drive(OWN[1], {}) is End.TIME
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from estimator.design.left_open import _larger as larger
 from estimator.design.open import Candidate, Open, Untested, name_of, precision_of as precision
 from estimator.design.paper import LEAST_DIFFERENCE, _on_paper as on_paper, as_model, distance, expected, shown, widths
 from estimator.design.untested import with_untested
+from estimator.diagnosis.inference.decide import Judged
 from estimator.diagnosis.inference.descent import THOROUGH, descended
 from estimator.diagnosis.inference.disturbances import whitener_of
 from estimator.diagnosis.inference.fits import Fits
@@ -50,6 +53,13 @@ def test_a_limit_that_is_not_there_is_left_out_of_the_model() -> None:
     assert not np.isfinite(list(best.result.values_of("torque_saturation").values())).all()
     model = as_model(Candidate(name_of(best.effects), 1.0, best, precision(best)), fits.model)
     assert "torque_saturation" in model.effects
+
+
+def test_what_pushed_the_vehicle_pushes_it_on_paper(known: Open) -> None:
+    candidate = known.candidates[0]
+    load = as_model(candidate, known.line).load
+    assert isinstance(load, float)
+    assert load == pytest.approx(5.0, abs=0.5)  # InitialCondition of the bench
 
 
 def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
@@ -129,16 +139,17 @@ GAIN = "inverter_gain_mismatch"
 def test_a_gain_is_shown_by_two_shares_neither_of_which_shows_it_alone(known: Open) -> None:
     halves = recorded_with_share(replace(known, untested=(GAIN,)), 0.5)
     paper = driven(known, 60.0)
-    assert shown(halves, with_share(paper, 0.5)) == ()
-    assert shown(halves, with_share(paper, 1.0)) == (GAIN,)
+    assert shown(halves, with_share(paper, 0.5)) == {}
+    assert shown(halves, with_share(paper, 1.0)) == {GAIN: math.inf}
 
 
 def test_what_an_experiment_hardly_tells_is_not_shown_by_it(known: Open) -> None:
     halves = recorded_with_share(replace(known, untested=(GAIN,)), 0.5)
     asked = replace(halves, supposed={GAIN: supposed(halves, GAIN)})
     short, long = (with_share(driven(known, 60.0, cycles), 1.0) for cycles in (8, 800))
-    assert shown(asked, long) == (GAIN,)
-    assert shown(asked, short) == ()
+    assert list(shown(asked, long)) == [GAIN]
+    assert shown(asked, long)[GAIN] > LEAST_DIFFERENCE
+    assert shown(asked, short) == {}
 
 
 def test_a_gain_that_was_not_tested_moves_the_values_by_what_it_changes_the_torque(known: Open) -> None:
@@ -183,6 +194,16 @@ def test_a_gain_that_the_other_values_take_up_is_untested_however_large_it_is() 
     found = with_untested(left_by(replace(bench, records=read), NAMES[0]))
     assert GAIN in found.untested
     assert found.supposed[GAIN].moves["J_M"] == pytest.approx(-0.05, abs=0.02)
+
+
+def test_a_likely_effect_that_the_verdict_does_not_name_is_another_explanation() -> None:
+    """The friction is there: a verdict of nothing leaves it open, and a verdict that names it leaves nothing open."""
+    bench = bench_with(NAMES[0], {"friction_nm": 8.0})
+    fits = Fits(bench.model, bench.records, bench.use, [NAMES[0], "transport_delay"])
+    friction = search_from_nothing(fits).best
+    nothing, named = fits.trials.of([fits.nothing(), friction])
+    assert [each.effects for each in larger(fits, Judged(nothing, named, nothing))] == [friction.effects]
+    assert larger(fits, Judged(nothing, named, named)) == []
 
 
 FILTER = ("speed_filter", {"time_constant_s": 0.01, "shape": 0.0})

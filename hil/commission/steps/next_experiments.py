@@ -39,6 +39,7 @@ def _do(job: StepContext) -> Outcome:
     if record.evidence:  # of an attempt that was interrupted
         known, whole = STATE.validate_python(record.evidence), {run.recording for run in record.runs}
         state.driven, state.odds = [each for each in known.driven if each.recording in whole], known.odds
+        state.ended_early = known.ended_early
 
     def keep(document: dict[str, Any]) -> None:
         record.evidence = document
@@ -60,6 +61,7 @@ def _do(job: StepContext) -> Outcome:
         lambda line: job.say(f"  {line}"),
         job.progress,
         lambda run: job.note(NAME, run),
+        tuple(job.rig.experiments),
     ).run()
     augmented = read_regular(job.folder / FOLDER / "augmented.toml")
     publish(job.folder, {AUGMENTED: lambda path: path.write_bytes(augmented)})

@@ -107,10 +107,14 @@ def observed(p: Physics, states: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class TruthDriveline:
-    """A driveline with all it hides; has the shape of ``hil.simulator.simulated_rig.SimulatedPlant``."""
+    """A driveline with all it hides; has the shape of ``hil.simulator.simulated_rig.SimulatedPlant``.
 
-    def __init__(self, physics: Physics, speed_rad_s: float = 0.0) -> None:
+    Its clock stands at zero for ``still_s``: moments and courses over time count from then.
+    """
+
+    def __init__(self, physics: Physics, speed_rad_s: float = 0.0, still_s: float = 0.0) -> None:
         self._physics = physics
+        self._still_s = still_s
         self._delay = DelayLine(physics.delay_s)
         self._state = np.zeros(STATES)
         self._state[list(SPEEDS)] = speed_rad_s
@@ -120,6 +124,9 @@ class TruthDriveline:
         total_nm = true_torque(self._physics, torque_nm, float(self._state[StateIndex.TIME_S]))
         for piece in self._delay.push(total_nm, duration_s):
             kernel.advance(self._state, self._physics, piece.torque_nm, piece.duration_s)
+        if self._still_s > 0.0:
+            self._still_s -= duration_s
+            self._state[StateIndex.TIME_S] = 0.0
 
     def course(self, m1_nm: FloatArray, m2_nm: FloatArray, durations_s: FloatArray) -> FloatArray:
         """Hold torques for their times, shapes (N,), one after the other; return the states after each, (N, STATES)."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hil.proof.truth import laws
-from hil.proof.truth.driveline import true_torque
+from hil.proof.truth.driveline import TruthDriveline, true_torque
 from hil.proof.truth.laws import TIME_TO_DERATE_S
+from hil.proof.truth.physics import SPEEDS, StateIndex
 
 
 def test_a_torque_derates_exponentially_or_evenly(plain):
@@ -17,6 +18,19 @@ def test_a_torque_derates_exponentially_or_evenly(plain):
     even = plain._replace(derating=0.2)
     assert true_torque(even, (60.0, 40.0), TIME_TO_DERATE_S / 2) == pytest.approx(90.0)
     assert true_torque(even, (60.0, 40.0), 2 * TIME_TO_DERATE_S) == pytest.approx(80.0)
+
+
+def test_what_goes_with_time_begins_when_the_clock_does(plain):
+    """A torque that derates evenly: whole while the clock stands still, then as from the beginning."""
+    derating = plain._replace(derating=0.2)
+    later, whole = TruthDriveline(derating, still_s=2.0), TruthDriveline(plain)
+    for _ in range(200):
+        later.advance((60.0, 40.0), 0.01)
+        whole.advance((60.0, 40.0), 0.01)
+    np.testing.assert_array_equal(later.state[list(SPEEDS)], whole.state[list(SPEEDS)])
+    for _ in range(300):
+        later.advance((60.0, 40.0), 0.01)
+    assert later.quantity(StateIndex.TIME_S) == pytest.approx(3.0, abs=0.011)
 
 
 @pytest.mark.parametrize(
