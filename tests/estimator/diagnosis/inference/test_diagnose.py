@@ -72,7 +72,7 @@ def test_a_law_of_no_entry_is_located_and_in_the_model_without_a_name() -> None:
     assert answer.remainder is not None
     assert answer.remainder.element is Element.SHAFT
     assert answer.remainder.law.endswith(f"it follows a torque over {answer.table.over}")
-    assert "Most likely it acts in the shaft." in answer.statement
+    assert "Most likely it acts in the shaft" in answer.statement
     content = diagnosis_json(answer)
     assert content["unnamed"]["element"] == "shaft"
     assert content["discrepancy"]["laws"] == [content["unnamed"]]
