@@ -231,6 +231,11 @@ def moved_values(of: Hypothesis, other: FitResult) -> dict[str, float]:
     return moved
 
 
+def can_be_retuned(line: DrivelineModel) -> bool:
+    """Tell whether a parameter is fitted: of a plant simulated elsewhere those that it can be given."""
+    return line.plant is None or any(parameter.tolerance > 0.0 for parameter in line.parameters.values())
+
+
 def retuned_parameters(result: FitResult, cov: FloatArray, model: DrivelineModel, whole: bool) -> dict[str, Retuned]:
     """Return every nominal parameter before and after; one trusted exactly stays what it was.
 

@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from estimator.diagnosis.acquisition.chain import Chain
 from estimator.diagnosis.assemble import (
     augmented_model,
+    can_be_retuned,
     found_effect,
     load_torques,
     retuned_parameters,
@@ -41,6 +43,7 @@ from estimator.diagnosis.result import (
     RejectedEffect,
     Remainder,
     Retuned,
+    Slight,
     UntestableEffect,
     Verdict,
 )
@@ -48,7 +51,7 @@ from estimator.diagnosis.tables import NO_LAW, Law
 from estimator.diagnosis.thresholds import Noise, Telling
 from estimator.diagnosis.where import locate
 from estimator.diagnosis.where.discrepancy import courses_of, discrepancy
-from estimator.diagnosis.wording import Context, statement
+from estimator.diagnosis.wording import Context, compared, statement
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.effect import Element, Untestable
 from estimator.physics.model import DrivelineModel
@@ -77,44 +80,21 @@ class Basis:
 
 def said(basis: Basis) -> Diagnosis:
     """Return the diagnosis: values with their intervals, the place, what was tried, and all of it in words."""
-    decision, fits, law = basis.decision, basis.search.fits, basis.law
-    judged, runs, verdict, line = decision.judged, decision.runs, decision.verdict, fits.model
-    nothing, best, believed = (each.hypothesis for each in (judged.nothing, judged.best, judged.believed))
-    is_explained = verdict is not Verdict.UNEXPLAINED
-    traces = judged.traces if is_explained else ()
-
-    estimate = estimate_of(runs.believed, runs.is_whole, runs.after)
-    fit, covariance = estimate.fit, estimate.covariance
-    named, noticed = ([found_effect(each, runs, estimate) for each in of] for of in (judged.named, traces))
-    slighted = tuple(slight(each, believed, fits.without(believed, each.name).result) for each in traces)
-    added = (*named, *decision.acquired) if is_explained else ()
-    augmented = augmented_model(fit, covariance, basis.model, (*added, *noticed))
-    parameters, loads = retuned_parameters(fit, covariance, line, is_explained), load_torques(fit, covariance, line)
-
-    courses, seen = courses_of(runs), None
-    if verdict is not Verdict.NO_MISMATCH and line.plant is None:
-        before, after = (each.result.first_outputs() for each in (nothing, believed))
-        seen = discrepancy(before, after if law is None else law.found.result, judged.noise, line.motion)
-
-    if law is not None:
-        augmented, courses = law.augmented(augmented), law.drawn(courses, believed, runs)
-        parameters = {name: each.at(augmented.parameters[name].value) for name, each in parameters.items()}
-        loads = load_torques(law.final, reported_covariance(law.final), line)
-
+    decision, law = basis.decision, basis.law
+    judged, runs, verdict, line = decision.judged, decision.runs, decision.verdict, basis.search.fits.model
+    values, courses, seen = _values(basis), courses_of(runs), _discrepancy(basis)
     mismatch, remainder = _mismatch(basis, seen), _remainder(decision, law)
-    values, records = line_values(believed.result), runs.chain.records
-    doubts = tuple(each for each in basis.doubts if not is_answered(each, named, line, values, records))
+
+    before = line_values(judged.believed.hypothesis.result)
+    doubts = tuple(d for d in basis.doubts if not is_answered(d, values.named, line, before, runs.chain.records))
     is_uncounted = bool(doubts) or any(name in TABLES for name in line.effects)
-    effects = _as_sure_as(is_uncounted, added)
+    effects = _as_sure_as(is_uncounted, values.added)
     elsewhere = {*basis.effort.untried, *(() if law is None else law.found.effects)}
-    others = rejected(fits, decision, basis.refinements, elsewhere)
-    standings = (*judged.named, *judged.traces, *judged.refinements)
-    looked_at = {other for each in standings for other in (each.name, *each.alike)} | {each.name for each in others}
-    blind = open_hypotheses(line, runs.chain.records)[1]  # behind a sensor blind for the sign more is tried than these
-    untestable = untestable_effects({name: why for name, why in blind.items() if name not in looked_at})
+    others = rejected(basis.search.fits, decision, basis.refinements, elsewhere)
+    untestable = _not_looked_at(basis, others)
     context = Context(
         remainder,
-        slighted,
+        values.slight,
         [each.name for each in basis.refinements],
         judged.off_nominal,
         untestable,
@@ -123,8 +103,8 @@ def said(basis: Basis) -> Diagnosis:
         None if seen is None else seen.element,
         doubts,
     )
-    is_without = law is None and not is_explained and judged.failed and not judged.off_nominal and line.plant is None
-    said_of_law = NO_LAW if is_without else "" if law is None else law.said
+    is_left = verdict is Verdict.UNEXPLAINED and judged.failed and not judged.off_nominal and line.plant is None
+    said_of_law = law.said if law is not None else NO_LAW if is_left else ""
     return Diagnosis(
         verdict=verdict,
         statement=f"{statement(verdict, decision.figures, effects, basis.effort, context)} {said_of_law}".rstrip(),
@@ -133,24 +113,77 @@ def said(basis: Basis) -> Diagnosis:
         rejected=others,
         untestable=untestable,
         fit=decision.figures if law is None else law.fit,
-        parameters=parameters,
-        load_torque=loads,
+        parameters=values.parameters,
+        load_torque=values.loads,
         timing_s={},
-        augmented=augmented,
-        traces=courses,
+        augmented=values.augmented,
+        traces=courses if law is None else law.drawn(courses, judged.believed.hypothesis, runs),
         warnings=basis.warnings,
         doubts=doubts,
         discrepancy=seen,
         remainder=remainder,
         off_nominal=judged.off_nominal,
-        slight=slighted,
+        slight=values.slight,
         refinements=tuple(
-            Refinement(each.name, each.objection, each.necessity.value, best.result.values_of(each.name))
+            Refinement(
+                each.name, each.objection, each.necessity.value, judged.best.hypothesis.result.values_of(each.name)
+            )
             for each in basis.refinements
         ),
         table=None if law is None else law.table,
         effort=basis.effort,
     )
+
+
+class Values(NamedTuple):
+    """What a result says in numbers; those of the line are of the model that it writes, a law without a name in it."""
+
+    named: Sequence[FoundEffect]  # effects that are believed, whatever the verdict
+    added: tuple[FoundEffect, ...]  # those that the model has, faults of the acquisition among them
+    slight: tuple[Slight, ...]  # traces
+    augmented: DrivelineModel  # the model as it was given, and what was found
+    parameters: Mapping[str, Retuned]  # of the line, by name
+    loads: Mapping[str, Estimated]  # constant load torque of each recording
+
+
+def _values(basis: Basis) -> Values:
+    decision, fits, law = basis.decision, basis.search.fits, basis.law
+    judged, runs, line = decision.judged, decision.runs, fits.model
+    is_explained = decision.verdict is not Verdict.UNEXPLAINED
+    traces, estimate = judged.traces if is_explained else (), estimate_of(runs.believed, runs.is_whole, runs.after)
+    fit, covariance = estimate.fit, estimate.covariance
+    named, noticed = ([found_effect(each, runs, estimate) for each in of] for of in (judged.named, traces))
+    believed = judged.believed.hypothesis
+    slighted = tuple(slight(each, believed, fits.without(believed, each.name).result) for each in traces)
+    added = (*named, *decision.acquired) if is_explained else ()
+    augmented = augmented_model(fit, covariance, basis.model, (*added, *noticed))
+    parameters, loads = retuned_parameters(fit, covariance, line, is_explained), load_torques(fit, covariance, line)
+    if law is not None:
+        augmented = law.augmented(augmented)
+        parameters = {name: each.at(augmented.parameters[name].value) for name, each in parameters.items()}
+        loads = load_torques(law.final, reported_covariance(law.final), line)
+    return Values(named, added, slighted, augmented, parameters, loads)
+
+
+def _discrepancy(basis: Basis) -> Discrepancy | None:
+    """Return where simulation and recordings differ, before and after; None where they do not, or nobody can tell."""
+    judged, line, law = basis.decision.judged, basis.search.fits.model, basis.law
+    if basis.decision.verdict is Verdict.NO_MISMATCH or line.plant is not None:
+        return None
+    before, after = (each.hypothesis.result.first_outputs() for each in (judged.nothing, judged.believed))
+    return discrepancy(before, after if law is None else law.found.result, judged.noise, line.motion)
+
+
+def _not_looked_at(basis: Basis, others: Sequence[RejectedEffect]) -> tuple[UntestableEffect, ...]:
+    """Return the effects that the recordings cannot tell and that were not tried all the same.
+
+    Behind a sensor that is blind for the sign more is tried than the recordings alone would tell.
+    """
+    judged = basis.decision.judged
+    standings = (*judged.named, *judged.traces, *judged.refinements)
+    tried = {other for each in standings for other in (each.name, *each.alike)} | {each.name for each in others}
+    blind = open_hypotheses(basis.search.fits.model, basis.decision.runs.chain.records)[1]
+    return untestable_effects({name: why for name, why in blind.items() if name not in tried})
 
 
 def _as_sure_as(is_uncounted: bool, effects: tuple[FoundEffect, ...]) -> tuple[FoundEffect, ...]:
@@ -197,11 +230,6 @@ def undecided(
         effort=effort,
         doubts=tuple(doubts),
     )
-
-
-def can_be_retuned(line: DrivelineModel) -> bool:
-    """Tell whether a parameter is fitted: of a plant simulated elsewhere those that it can be given."""
-    return line.plant is None or any(parameter.tolerance > 0.0 for parameter in line.parameters.values())
 
 
 def untestable_effects(blind: Mapping[str, Untestable]) -> tuple[UntestableEffect, ...]:
@@ -347,7 +375,7 @@ def rejected(
     ):
         for name, score in sorted(scores.items(), key=lambda item: item[::-1]):  # not as cores came to their end
             if name not in found and name not in known:
-                fitted = reason.format(_compared(score - best))
+                fitted = reason.format(compared(score - best))
                 seen = _as_tried(name, judged.tried.values(), judged.believed)
                 text = seen if seen and score < best else fitted
                 found[name] = RejectedEffect(name, text, min(best - score, 0.0))
@@ -370,14 +398,3 @@ def _as_tried(name: str, tried: Iterable[Trial], believed: Trial) -> str:
     if best.clearly_beats(believed):
         return f"{said}: less, but not by enough to establish it"
     return f"{said}: less, but by no more than the scatter from block to block"
-
-
-def _compared(worse: float) -> str:
-    """Say by how much a score is worse than that of what is believed; one that is better is no ground to reject it."""
-    if abs(worse) < Telling.NO_WORSE:
-        return "as good as without"
-    if worse < 0.0:
-        return (
-            "more probable than what is believed, less than sets of as many effects that were tried and not established"
-        )
-    return f"worse by {worse:.3g} in minus twice the log-probability"

@@ -225,3 +225,14 @@ def _left(verdict: Verdict, remainder: Remainder, element: Element | None, alone
     other = "" if alone in (None, element) else f"; an input by itself would most likely act {PLACES[alone]}"
     where = "" if element is None else f" Most likely it acts {PLACES[element]}{other}."
     return f"What is left{without} is {noise} times the noise, and it is not noise: it {remainder.law}.{where}"
+
+
+def compared(worse: float) -> str:
+    """Say by how much a score is worse than that of what is believed; one that is better is no ground to reject it."""
+    if abs(worse) < Telling.NO_WORSE:
+        return "as good as without"
+    if worse < 0.0:
+        return (
+            "more probable than what is believed, less than sets of as many effects that were tried and not established"
+        )
+    return f"worse by {worse:.3g} in minus twice the log-probability"
