@@ -18,7 +18,9 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.unknowns import LocalBasis
 from estimator.signals.record import FloatArray, Record
 
-EDGE_S = 0.5  # an event's moment nearer to a recording's end is none: any start-up error looks like one
+EDGE_S = 0.5
+"""An event's moment nearer to a recording's end is none: any start-up error looks like one. Nor is an event that is
+over sooner: with a single sample of it, two vehicles would be one that changed."""
 
 EQUIVALENT_RATIO = 1.001
 """Squared error expressed the other way round, over the one before, up to which it is the same explanation."""
@@ -127,9 +129,9 @@ def _complement(
 
 
 def has_edge(name: str, result: FitResult) -> bool:
-    """Tell whether an event begins or ends inside a recording.
+    """Tell whether an event begins or ends inside a recording, and acts there for longer than a glimpse.
 
-    Where it would be another effect if it acted all along, not a glimpse of it counts, next to whole recordings.
+    Where it would be another effect if it acted all along, that must be more next to whole recordings.
     """
     acting = [
         (to_s - from_s, inside(record, from_s) or inside(record, to_s))
@@ -138,4 +140,4 @@ def has_edge(name: str, result: FitResult) -> bool:
     ]
     seen_s = sum(length_s for length_s, edged in acting if edged)
     least = PART_SEEN if EFFECTS[name].permanent else 0.0
-    return seen_s > least * sum(length_s for length_s, _ in acting)
+    return seen_s > max(EDGE_S, least * sum(length_s for length_s, _ in acting))

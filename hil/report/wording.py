@@ -148,5 +148,5 @@ def location_rows(mismatch: Mismatch) -> list[tuple[str, str]]:
         region = mismatch.region
         rows.append((f"where {region.signal} is", f"from {shown(region.low)} to {shown(region.high, region.unit)}"))
     rows += [(f"time in {name}", shown_times(spans)) for name, spans in mismatch.time_s.items() if spans]
-    rows.append(("p-value of the re-tuned model", shown_p(mismatch.p_value)))
+    rows.append(("p-value against the best set of effects", shown_p(mismatch.p_value)))
     return rows

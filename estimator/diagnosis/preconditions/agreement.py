@@ -26,6 +26,7 @@ from estimator.identification.offline.linearity import judge_linearity
 from estimator.identification.offline.validation import validate
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel, Structure, natural_frequencies_rad_s
+from estimator.physics.steps import EDGE_S, inside
 from estimator.signals.decimate import HIGH_PASS_HZ, first_part, high_passed
 from estimator.signals.record import OutputKind, Record
 
@@ -72,8 +73,9 @@ def is_answered(
 
 
 def _begins_or_ends_in(record: Record, event: FoundEffect) -> bool:
-    first_s, last_s = record.time_s[0] + record.sample_time_s, record.time_s[-1] - record.sample_time_s
-    return any(first_s < moment_s < last_s for span in event.time_s.get(record.name, ()) for moment_s in span)
+    began = float(record.time_s[0] - record.since_start_s[0])
+    spans = [span for span in event.time_s.get(record.name, ()) if span[1] - span[0] > EDGE_S]
+    return any(inside(record, moment_s - began) for span in spans for moment_s in span)
 
 
 def _is_either_way(ratio: float, change: float) -> bool:

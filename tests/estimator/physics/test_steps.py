@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from estimator.physics.fit import fit
 from estimator.physics.problem import make_problem
-from estimator.physics.steps import from_their_moment, moments_of
+from estimator.physics.steps import from_their_moment, has_edge, moments_of
 from estimator.physics.unknowns import effect_unknowns, nominal_unknowns
 from estimator.signals.record import Record
 from tests.estimator.physics.bench import TWO_MASS, model
@@ -58,3 +59,16 @@ class TestFromTheirMoment:
         found = fit(make_problem(soft, [cracking(1, AT_S, LAST_S)], (*nominal_unknowns(soft), *start), own=own))
         assert found.rms == pytest.approx(SIGMA, rel=0.05)
         assert from_their_moment(found, soft) is found
+
+
+@pytest.mark.parametrize(("ended_s", "is_event"), [(3.01, False), (4.0, True)])
+def test_a_glimpse_of_an_event_next_to_a_whole_recording_is_none(
+    records: list[Record], ended_s: float, is_event: bool
+) -> None:
+    """Of two vehicles one is stiffer all along: a sample of that in the other's recording makes it no change."""
+    result = the_other_way_round(SOUND, records, [(3.0, 3.0), (0.0, LAST_S)])
+    local = [result.local_of(i).copy() for i in range(2)]
+    for i, moments in enumerate([(3.0, ended_s), (0.0, LAST_S)]):
+        local[i][result.problem.local[i].own_rows] = moments
+    x = np.concatenate([result.x[: len(result.problem.shared)], *local])
+    assert has_edge(CRACK, replace(result, x=x)) is is_event
