@@ -39,7 +39,7 @@ MOST_UNSEEN = 4
 
 def with_untested(known: Open) -> Open:
     """Suppose the effects that the recordings cannot show, and those that they could and do not."""
-    supposed = {name: _settled(known, name, begun) for name in known.untested if (begun := _begun(known, name))}
+    supposed = {name: _settled(known, name, start) for name in known.untested if (start := _start_of(known, name))}
     unseen = sorted(_unseen(known), key=_farthest, reverse=True)[:MOST_UNSEEN]
     names = (*known.untested, *(each.name for each in unseen))
     return replace(known, untested=names, supposed=supposed | {each.name: each for each in unseen})
@@ -51,14 +51,16 @@ def _unseen(known: Open) -> Iterator[Untested]:
     taken = _directions(first)
     tried = frozenset().union(*(each.effects for each in known.candidates))
     for name in open_hypotheses(known.line, known.records)[0]:
-        begun = None if name in tried or EFFECTS[name].event else _begun(known, name)  # an event may come at any time
-        if begun is None:
+        start = (
+            None if name in tried or EFFECTS[name].event else _start_of(known, name)
+        )  # an event may come at any time
+        if start is None:
             continue
-        change = first.filter(begun.residual - first.result.residual)
+        change = first.filter(start.residual - first.result.residual)
         whole = float(change @ change)
         if whole - float(np.sum((taken.T @ change) ** 2)) >= max(LEAST_DIFFERENCE, MOSTLY * whole):
             continue
-        found = _settled(known, name, begun)
+        found = _settled(known, name, start)
         if (
             found.moves
             and _squares(first, found.supposed.fit.result) - _squares(first, first.result) < LEAST_DIFFERENCE
@@ -81,7 +83,7 @@ def _farthest(untested: Untested) -> float:
     return max(map(abs, untested.moves.values()))
 
 
-def _begun(known: Open, name: str) -> FitResult | None:
+def _start_of(known: Open, name: str) -> FitResult | None:
     """Return the most probable hypothesis with an effect, not yet fitted; None of a profile, which has no size."""
     first, line = known.candidates[0], known.line
     result, records = first.fit.result, first.fit.result.problem.records
@@ -98,10 +100,10 @@ def _begun(known: Open, name: str) -> FitResult | None:
     return extended(problem, warm_start(problem, result), result)
 
 
-def _settled(known: Open, name: str, begun: FitResult) -> Untested:
+def _settled(known: Open, name: str, start: FitResult) -> Untested:
     """Fit the other unknowns with an effect in the size supposed."""
     first = known.candidates[0].fit
-    settled = descended(begun, first.filter, SUPPOSED)
+    settled = descended(start, first.filter, SUPPOSED)
     fit_with = replace(first, effects=first.effects | {name}, result=settled)
     shared = len(settled.problem.shared)
     candidate = Candidate(name_of(fit_with.effects), math.nan, fit_with, np.zeros((shared, shared)))

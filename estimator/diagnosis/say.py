@@ -304,7 +304,7 @@ def effort_of(search: Search, level: str, decision: Decision) -> Effort:
 
 
 def effort_so_far(fits: Fits | None, names: Sequence[str], work: Work, level: str) -> Effort:
-    """Return what a search had cost when the limit of time ended it; without fits, it had not begun."""
+    """Return what a search had cost when the limit of time ended it; without fits, it had not started."""
     if fits is None:
         return Effort(level, 0, False, tuple(names), len(names), work.limit_s)
     tried = {*fits.scores(), *fits.implausible}

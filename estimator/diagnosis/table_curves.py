@@ -1,7 +1,7 @@
-"""A curve that is fitted in the free run: its knots, its unknowns, where it is begun from, and how it is fitted.
+"""A curve that is fitted in the free run: its knots, its unknowns, where it starts, and how it is fitted.
 
 A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays near
-it where the law is strongly nonlinear, as a gap or a freewheel is: so each place is begun from several shapes, under an
+it where the law is strongly nonlinear, as a gap or a freewheel is: so each place starts from several shapes, under an
 observer whose gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no
 simulation runs away.
 """
@@ -337,9 +337,9 @@ def scouted(curve: Curve, retuned: FitResult, fitting: Masks) -> Scouted:
     return descent, sorted(left, key=lambda each: each[0])
 
 
-def best_curve(begun: Scouted, choosing: Masks) -> Candidate:
+def best_curve(start: Scouted, choosing: Masks) -> Candidate:
     """Let the observer's gain down from the best shapes, and return what the choosing samples prefer."""
-    (descent, left), found = begun, list[Candidate]()
+    (descent, left), found = start, list[Candidate]()
     for _, z in left[: Curves.CONTINUED]:
         for gain in GAINS[SCOUTS:]:
             z, _ = descent.fitted(z, gain, SMOOTHNESS[0], STEPS)

@@ -105,8 +105,8 @@ def curve_through(result: FitResult, place: str) -> Candidate | None:
     curve = None if place not in SEARCHED[result.problem.grid.structure] else curve_at(place, result, GAINS[0])
     if curve is None:
         return None
-    begun = scouted(curve, result, result.problem.use)
-    return best_curve(begun, result.problem.use)
+    start = scouted(curve, result, result.problem.use)
+    return best_curve(start, result.problem.use)
 
 
 Values = Mapping[str, Mapping[str, EffectValue]]

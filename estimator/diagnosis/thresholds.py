@@ -441,10 +441,10 @@ class Curves:
 
     REACH = 1.5  # knots reach to so many times what the re-tuned model reaches
     FRACTIONS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that, where they stand on both sides of zero
-    EVEN_KNOTS = 7  # knots of a signal of one sign, equally far apart
+    EVEN_KNOTS = 7  # knots of a signal of one sign, at equal distances
     FEWEST_SAMPLES = 40  # samples between two knots at least
     TWO_SIDED = 0.1  # share of the longer side that the shorter one must reach for knots on both sides of zero
-    # Shares of the reach within which a curve is begun as a gap, a limit, a step: between its innermost knots
+    # Shares of the reach within which a curve starts as a gap, a limit, a step: between its innermost knots
     GAP, LIMIT, STEP = 0.13, 0.2, 0.1
     # Blocks of equal length that each recording is cut into, and which of them choose and which judge; to the rest
     # curves are fitted. The last one judges: what has run away by then is no law.

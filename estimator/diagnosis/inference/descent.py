@@ -128,7 +128,7 @@ def covariance_of_innovations(hypothesis: Hypothesis) -> FloatArray:
 def extended(problem: Problem, x: FloatArray, previous: FitResult, anew: str = "") -> FitResult:
     """Return the free run of a problem at ``x`` with the derivative of a fit with which it has unknowns in common.
 
-    The columns of the others are found, and those of the parameters of an effect that is begun ``anew``.
+    The columns of the others are found, and those of the parameters of an effect that starts ``anew``.
     """
     low, high = bounds(problem)
     x = np.clip(x, low, high)

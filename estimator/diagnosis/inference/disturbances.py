@@ -225,7 +225,7 @@ def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
 
 
 def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
-    """Return where else a noise model is begun: a drifting torque and a walking load take each other's place."""
+    """Return where else a noise model starts: a drifting torque and a walking load take each other's place."""
     found = [sizes]
     for large, small in ((Size.WALK, Size.DRIFT), (Size.DRIFT, Size.WALK)):
         other = sizes.copy()

@@ -145,9 +145,9 @@ class Fits:
         return self.ended[NOTHING]
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
-        """Fit a set without one of its effects, the others begun where they are, once from each set.
+        """Fit a set without one of its effects, the others started where they are, once from each set.
 
-        The smaller set may be known: from where it was begun before it may have ended in a poorer optimum.
+        The smaller set may be known: from where it was started before it may have ended in a poorer optimum.
         """
         effects = current.effects - {name}
         if self.is_first("without", current.effects, name) or effects not in self.ended:
@@ -168,8 +168,8 @@ class Fits:
     ) -> Hypothesis | None:
         """Fit an effect on top of a set a few steps, from each of its starts; None where no value is a case of it.
 
-        Where it takes the place of another effect, it is begun and weighted as the set with that one: ``instead``. So
-        is an effect of that set that is begun elsewhere.
+        Where it takes the place of another effect, it is started and weighted as the set with that one: ``instead``. So
+        is an effect of that set that starts elsewhere.
         """
         effects = with_effect(current.effects, name)
         is_again = instead is not None and name in instead.effects
@@ -304,10 +304,10 @@ def with_effect(effects: Effects, name: str) -> Effects:
 
 
 def inheriting(name: str, release: Release, previous: FitResult) -> Release:
-    """Return a start of a general law that keeps what a fit of its special case has found out by another telling.
+    """Return a start of a general law that keeps what a fit of its special case has found out in another form.
 
-    Friction that was seen to bend before it slides does so with a Stribeck range, too: started without, such a fit is
-    far behind the special case and would be given up.
+    Friction that was seen to deflect before it slides does so with a Stribeck range, too: started without, such a fit
+    is far behind the special case and would be given up.
     """
     found = {
         key: value for special in EFFECTS[name].contains for key, value in previous.values_of(special).items() if value

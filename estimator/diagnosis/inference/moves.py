@@ -1,4 +1,4 @@
-"""Moves: from one set of effects to the next, by an effect added, dropped, begun elsewhere or exchanged.
+"""Moves: from one set of effects to the next, by an effect added, dropped, started elsewhere or exchanged.
 
 Each move returns the sets that it leads to, fitted; `better_than` takes the first of them that is better. Effects are
 not fitted in turn: a score test around the present fit says what each one promises, and the most promising are fitted a
@@ -84,7 +84,7 @@ def begun_elsewhere(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
     """
     found: list[Hypothesis | None] = []
     for name in sorted(current.effects - {GRADE}):
-        if fits.is_first("begun elsewhere", current.effects, name):
+        if fits.is_first("started elsewhere", current.effects, name):
             found += fits.rewritten(current, name)
             if EFFECTS[name].event:
                 found.append(fits.elsewhere(current, name))
