@@ -11,7 +11,7 @@ from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import InitialCondition
-from estimator.physics.effect import Effect, Element, Held
+from estimator.physics.effect import Effect, Element, Held, Place
 from estimator.physics.kernel import slots
 from estimator.physics.layout import flat, flat_values, grid_for, slot
 from estimator.physics.simulate import simulate
@@ -166,6 +166,14 @@ def test_every_entry_has_its_law_in_the_simulation(entry: Effect) -> None:
         f"{entry.name}: the simulation does not read {', '.join(missing)}. Give the entry acting=Acting(place, law) "
         "(estimator/physics/effect.py), or a place in estimator/physics/kernel/slots.py and the law that reads it."
     )
+
+
+@entries
+def test_a_law_has_a_state_where_its_place_has_laws_with_one(entry: Effect) -> None:
+    """The simulation adds up the shaft's laws with a state alone, and no laws with a state at other places."""
+    if entry.acting is not None:
+        allowed = {Place.SHAFT: (True,), Place.MOTOR: (True, False), Place.LOAD: (True, False)}
+        assert (entry.acting.rate is not None) in allowed.get(entry.acting.place, (False,))
 
 
 @entries
