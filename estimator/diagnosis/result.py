@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 from estimator.errors import Cure
@@ -90,10 +90,6 @@ class Retuned:
     value: float  # inside its tolerance
     ci95: Interval  # ends of the interval, cut at the tolerance
     unit: str  # SI
-
-    def at(self, value: float) -> Retuned:
-        """Return it at another value, with an interval that holds this one, too."""
-        return replace(self, value=value, ci95=(min(self.ci95[0], value), max(self.ci95[1], value)))
 
 
 @dataclass(frozen=True, slots=True)

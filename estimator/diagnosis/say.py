@@ -136,7 +136,10 @@ def said(basis: Basis) -> Diagnosis:
 
 
 class Values(NamedTuple):
-    """What a result says in numbers; those of the line are of the model that it writes, a law without a name in it."""
+    """What a result says in numbers: those that are reported with an interval are next to the names that are believed.
+
+    The model that is written has a law without a name as well, and what the line is next to it.
+    """
 
     named: Sequence[FoundEffect]  # effects that are believed, whatever the verdict
     added: tuple[FoundEffect, ...]  # those that the model has, faults of the acquisition among them
@@ -157,11 +160,9 @@ def _values(basis: Basis) -> Values:
     slighted = tuple(slight(each, believed, fits.without(believed, each.name).result) for each in traces)
     added = (*named, *decision.acquired) if is_explained else ()
     augmented = augmented_model(fit, covariance, basis.model, (*added, *noticed))
-    parameters, loads = retuned_parameters(fit, covariance, line, is_explained), load_torques(fit, covariance, line)
     if law is not None:
         augmented = law.augmented(augmented)
-        parameters = {name: each.at(augmented.parameters[name].value) for name, each in parameters.items()}
-        loads = load_torques(law.final, reported_covariance(law.final), line)
+    parameters, loads = retuned_parameters(fit, covariance, line, is_explained), load_torques(fit, covariance, line)
     return Values(named, added, slighted, augmented, parameters, loads)
 
 

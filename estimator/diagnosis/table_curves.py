@@ -1,9 +1,11 @@
 """A curve that is fitted in the free run: its knots, its unknowns, where it starts, and how it is fitted.
 
-A curve's unknowns are the slopes between its knots, which are laid by the data. A fit from a straight curve stays near
-it where the law is strongly nonlinear, as a gap or a freewheel is: so each place starts from several shapes, under an
-observer whose gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no
-simulation runs away.
+A curve's unknowns are the slopes between its knots, which are laid by the data, and its level where the recordings show
+it. What the line could carry itself, a slope and a constant torque, stays with it as it is without the curve:
+recordings tell the sum alone, and the curve is what the line lacks. A fit from a straight curve stays near it where the
+law is strongly nonlinear, as a gap or a freewheel is: so each place starts from several shapes, under an observer whose
+gain is let down to 0 (``layout.OBSERVER``). With a large one every sample is a fresh start, and no simulation runs
+away.
 """
 
 from __future__ import annotations
@@ -16,20 +18,24 @@ import numpy as np
 
 from estimator.diagnosis.thresholds import Curves
 from estimator.least_squares import minimise
+from estimator.physics.catalogue import EFFECTS
 from estimator.physics.curve import curve_over
 from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
-from estimator.physics.layout import OBSERVER, flat_values, slot
+from estimator.physics.layout import LOAD, OBSERVER, flat_values, slot
 from estimator.physics.motion import torque_scale
 from estimator.physics.problem import Problem, bounds, case_of, outputs_at, residual_at
 from estimator.physics.table_signals import signal_of
-from estimator.physics.tables import COUNT, DAMPING, PREFIX, Table
-from estimator.physics.unknowns import Shared
-from estimator.signals.correlation import effective_samples
+from estimator.physics.tables import COUNT, DAMPING, PLACES, PREFIX, Table
+from estimator.physics.unknowns import LOAD_TORQUE, Shared
 from estimator.signals.record import BoolArray, FloatArray
 
 STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_speed": "b_L"}
-"""Parameter of the line that a straight curve at a place does the same as: intervals are those of both together."""
+"""Parameter of the line that a straight curve at a place does the same as: it stays as it is without the curve."""
+
+LEVELLED = frozenset({"torque", "motor_speed", "load_speed"})
+"""Places at which a curve that is constant does the same as a constant load: the load of the first recording stays as
+it is without the curve. In a shaft a constant torque is a turn of its twist's zero, and the curve is 0 at one knot."""
 
 YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 """A torque over the twist that yields, as a clutch slips: a straight curve and the slider of this effect."""
@@ -80,20 +86,37 @@ class Curve:
 
     @property
     def pieces(self) -> int:
-        """How many slopes it has: as many as values that are not 0."""
+        """How many slopes it has."""
         return self.knots.size - 1
 
     @property
     def zero(self) -> int:
-        """The knot whose value is 0: what is constant is the load's."""
+        """The knot at which the value is the level."""
         return int(np.argmin(np.abs(self.knots)))
 
+    @property
+    def free(self) -> list[int]:
+        """The knots whose values are unknown: all, or those but ``zero``."""
+        return [i for i in range(self.knots.size) if self.place in LEVELLED or i != self.zero]
+
+    @property
+    def straight(self) -> FloatArray:
+        """Unknowns, shape (U,), of a curve that does nothing: its own slopes, and a level of 0 where it has one."""
+        return np.append(np.full(self.pieces, self.own), np.zeros(len(self.free) - self.pieces))
+
     @cached_property
-    def values_of_slopes(self) -> FloatArray:
-        """Matrix from slopes, less its own, to the values but that of knot ``zero``; shape (pieces, pieces)."""
+    def of_unknowns(self) -> FloatArray:
+        """Matrix from slopes, less its own, and the level to the values that are unknown; shape (U, U)."""
         steps = self.base * np.diff(self.knots)
         sums = np.vstack([np.zeros(self.pieces), np.tril(np.ones((self.pieces, self.pieces))) * steps])
-        return np.delete(sums - sums[self.zero], self.zero, axis=0)
+        level = np.full((self.knots.size, 1), self.base * np.abs(self.knots).max())
+        return np.hstack([sums - sums[self.zero], level])[self.free, : len(self.free)]
+
+    def values(self, unknowns: FloatArray) -> FloatArray:
+        """Return the values at all knots, shape (K,) [Nm], of slopes and the level, shape (U,)."""
+        found = np.zeros(self.knots.size)
+        found[self.free] = self.of_unknowns @ (unknowns - self.straight)
+        return found
 
     def drawn_in(self, signal: FloatArray) -> Curve:
         """Return the curve with knots where a simulation with it was, ``signal`` (N,), and none beyond.
@@ -106,11 +129,13 @@ class Curve:
         down, up = (_outward(sign * anchor, side, sign * signal) for sign, side in zip((-1.0, 1.0), sides, strict=True))
         return replace(self, knots=np.array([*(-each for each in reversed(down)), anchor, *up]))
 
-    def slopes_between(self, knots: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Return the slopes, shape (K - 1,), of this curve of these ``slopes`` between K other knots."""
-        values = np.insert(self.values_of_slopes @ (slopes - self.own), self.zero, 0.0)
-        there = values_at(Table(self.place, tuple(self.knots.tolist()), tuple(values.tolist())), knots)
-        return np.diff(there) / (self.base * np.diff(knots)) + self.own
+    def through(self, other: Curve, unknowns: FloatArray) -> FloatArray:
+        """Return the unknowns with which this curve is another one of ``unknowns``, at its own knots."""
+        table = Table(self.place, tuple(other.knots.tolist()), tuple(other.values(unknowns).tolist()))
+        there = values_at(table, self.knots)
+        slopes = np.diff(there) / (self.base * np.diff(self.knots))
+        level = there[self.zero] / (self.base * np.abs(self.knots).max())
+        return self.straight + np.append(slopes, level)[: len(self.free)]
 
     def released(self, result: FitResult, use: Masks) -> Problem:
         """Return the problem of a fit with the curve's values next to its own unknowns."""
@@ -119,11 +144,7 @@ class Curve:
         p[slot(self.name, COUNT)] = self.knots.size
         for i, knot in enumerate(self.knots.tolist()):
             p[slot(self.name, f"knot_{i + 1}")] = knot
-        more = [
-            Shared(self.name, f"value_{i + 1}", 1.0, -np.inf, np.inf, 0.0)
-            for i in range(self.knots.size)
-            if i != self.zero
-        ]
+        more = [Shared(self.name, f"value_{i + 1}", 1.0, -np.inf, np.inf, 0.0) for i in self.free]
         if self.yields:
             p[slot(SLIDER, "sharpness")] = SUDDEN
         return replace(problem, p=p, shared=(*problem.shared, *more, *self.more), use=use)
@@ -224,28 +245,46 @@ def shapes(curve: Curve) -> dict[str, FloatArray]:
 
 
 class Descent:
-    """The fit of one curve: unknowns are those of the line, the curve's slopes and damping, and the recordings' own."""
+    """The fit of one curve: unknowns are the line's, the curve's slopes, level and damping, and the recordings' own."""
 
     def __init__(self, curve: Curve, result: FitResult, use: Masks) -> None:
         self.curve, self.problem = curve, curve.released(result, use)
         self.first = len(result.problem.shared)
-        self.after = self.first + curve.pieces
+        self.after = self.first + len(curve.free)
         self._x0 = result.x
         self._scale = np.sqrt(max(result.squares, 1e-300) / 1000.0)
         low, high = bounds(self.problem)
-        low[self.first : self.after], high[self.first : self.after] = curve.most
+        slopes = slice(self.first, self.first + curve.pieces)
+        low[slopes], high[slopes] = curve.most
+        self.held = self._straight()
+        low[self.held] = high[self.held] = self.start(np.empty(0))[self.held]
         self.low, self.high = low, high
+
+    def _straight(self) -> list[int]:
+        """Return where what stays as it is without the curve stands: a slope of the line, a constant load."""
+        place, known = self.curve.place, self.problem.shared[: self.first]
+        names = {STRAIGHT.get(place), LOAD} if place in LEVELLED else {STRAIGHT.get(place)}
+        found = [i for i, each in enumerate(known) if not each.effect and each.name in names]
+        if place in LEVELLED and all(each.name != LOAD for each in known):
+            found.append(len(self.problem.shared) + LOAD_TORQUE)
+        return found
+
+    @property
+    def named(self) -> list[int]:
+        """Where the values of named laws of the same part stand."""
+        known, part = self.problem.shared[: self.first], PLACES[self.curve.place].element
+        return [i for i, each in enumerate(known) if each.effect and EFFECTS[each.effect].element is part]
 
     def start(self, slopes: FloatArray) -> FloatArray:
         """Return unknowns with these slopes, all else as the line had it."""
-        own = [each.start for each in self.curve.more]
-        return np.concatenate([self._x0[: self.first], slopes, own, self._x0[self.first :]])
+        own, of_curve = [each.start for each in self.curve.more], self.curve.straight
+        of_curve[: slopes.size] = slopes
+        return np.concatenate([self._x0[: self.first], of_curve, own, self._x0[self.first :]])
 
     def x(self, z: FloatArray) -> FloatArray:
         """Return the scaled unknowns of the problem: values in the place of slopes."""
-        x = z.copy()
-        slopes = z[self.first : self.after] - self.curve.own
-        x[self.first : self.after] = self.curve.values_of_slopes @ slopes
+        x, of_curve = z.copy(), slice(self.first, self.after)
+        x[of_curve] = self.curve.values(z[of_curve])[self.curve.free]
         return x
 
     def at(self, gain: float) -> Problem:
@@ -258,7 +297,7 @@ class Descent:
         """Return unknowns after some steps at a gain, and the squared error there."""
         problem, seen = self.at(gain), dict[bytes, tuple[FloatArray, ...]]()
         of_curve = slice(self.first, self.after)
-        each = np.eye(self.curve.pieces)
+        each = np.eye(self.curve.pieces, len(self.curve.free))  # a level is free
         penalty = np.sqrt(smooth) * np.vstack([np.diff(each, axis=0), 1e-2 * each])
         rows = np.zeros((penalty.shape[0], z.size))
         rows[:, of_curve] = penalty
@@ -271,12 +310,14 @@ class Descent:
             return seen[key]
 
         def residual(z: FloatArray) -> FloatArray:
-            bent = penalty @ (z[of_curve] - self.curve.own)  # other unknowns may be infinite, as a limit of none is
+            bent = penalty @ (
+                z[of_curve] - self.curve.straight
+            )  # other unknowns may be infinite, as a limit of none is
             return np.concatenate([residual_at(problem, outputs(z)) / self._scale, bent])
 
         def jacobian(z: FloatArray) -> FloatArray:
             found = jacobian_at(problem, self.x(z), outputs(z))
-            found[:, of_curve] = found[:, of_curve] @ self.curve.values_of_slopes
+            found[:, of_curve] = found[:, of_curve] @ self.curve.of_unknowns
             return np.vstack([found / self._scale, rows])
 
         solution = minimise(residual, jacobian, z, self.low, self.high, steps)
@@ -312,11 +353,11 @@ class Candidate:
 
     def drawn_in(self, result: FitResult, use: Masks) -> Candidate:
         """Draw the knots in to where the simulation with the curve was; fitted once more where that changes it."""
-        old, slopes = self.descent, slice(self.descent.first, self.descent.after)
-        curve = old.curve.drawn_in(signal_over(old.curve.place, with_curve(self), 0.0))
-        between = old.curve.slopes_between(curve.knots, self.z[slopes])
+        old, of_curve = self.descent.curve, slice(self.descent.first, self.descent.after)
+        curve = old.drawn_in(signal_over(old.place, with_curve(self), 0.0))
+        through = curve.through(old, self.z[of_curve])
         descent = Descent(curve, result, use)
-        z = np.concatenate([self.z[: slopes.start], between, self.z[slopes.stop :]])
+        z = np.concatenate([self.z[: of_curve.start], through, self.z[of_curve.stop :]])
         if not curve.yields:  # a straight one is the same through any knots
             z, _ = descent.fitted(z, 0.0, self.smooth, LAST_STEPS)
         return replace(self, descent=descent, z=z)
@@ -362,32 +403,3 @@ def with_curve(found: Candidate) -> FitResult:
         p[problem.shared[i].slot] = problem.shared[i].scale * x[i]
     given = replace(problem, p=p, shared=problem.shared[: descent.first])
     return FitResult(given, np.delete(x, added), outputs, residual_at(problem, outputs), None, False)
-
-
-def reported(found: Candidate) -> tuple[FitResult, Table]:
-    """Return the fit with the curve among what is given, and the curve with its intervals."""
-    descent, fit = found.descent, with_curve(found)
-    problem, x, curve = descent.at(0.0), descent.x(found.z), descent.curve
-    values = np.insert(x[descent.first : descent.after], curve.zero, 0.0)
-    half = np.insert(_half_widths(descent, problem, x, fit.outputs, fit.residual), curve.zero, 0.0)
-    bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
-    damping = float(fit.problem.p[slot(curve.name, DAMPING)]) if curve.more else 0.0
-    return fit, Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
-
-
-def _half_widths(
-    descent: Descent, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], residual: FloatArray
-) -> FloatArray:
-    """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
-    derivative = jacobian_at(problem, x, outputs)
-    for i, each in enumerate(problem.shared):
-        if not each.effect and each.name == STRAIGHT.get(descent.curve.place):  # a recording tells their sum
-            derivative[:, i] = 0.0
-    free = np.flatnonzero(derivative.any(axis=0))
-    j = derivative[:, free]
-    variance = float(residual @ residual) / effective_samples([residual])
-    scale = np.sqrt(np.maximum(np.diag(j.T @ j), 1e-300))
-    inverse = np.linalg.pinv((j / scale).T @ (j / scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
-    spread = np.zeros(x.size)
-    spread[free] = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance)
-    return Z95 * spread[descent.first : descent.after]

@@ -30,14 +30,15 @@ from estimator.diagnosis.table_curves import (
     Z95,
     Candidate,
     Curve,
+    Descent,
     Masks,
     best_curve,
     curve_at,
-    reported,
     rms_over,
     scouted,
     signal_over,
     values_at,
+    with_curve,
 )
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.diagnosis.thresholds import Curves
@@ -46,10 +47,12 @@ from estimator.physics.driveline import Structure
 from estimator.physics.effect import Element
 from estimator.physics.fit import ITERATIONS, FitResult, fit
 from estimator.physics.free_run import simulate_foreign
+from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, EffectValue, unit
-from estimator.physics.problem import outputs_at, residual_at
-from estimator.physics.tables import PLACES, Table
+from estimator.physics.problem import Problem, outputs_at, residual_at
+from estimator.physics.tables import DAMPING, PLACES, Table
+from estimator.signals.correlation import effective_samples
 from estimator.signals.record import BoolArray, FloatArray, Record
 
 AT_SLIDER = slot(SLIDER, "friction_nm")
@@ -161,6 +164,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     after = judged.descent.error(judged.z, unseen)
     if after > Curves.BETTER * before:
         return None
+    whole = fit(whole.problem, whole.x, ITERATIONS)
     last = judged.refitted(whole, use).drawn_in(whole, use)
     result, table = reported(last)
     curve = last.descent.curve
@@ -218,6 +222,34 @@ def _between(best: Candidate, whole: FitResult) -> tuple[FitResult, Values]:
     use = tuple(used & between for used, between in zip(whole.problem.use, seen, strict=True))
     result, table = reported(best.refitted(fit(replace(whole.problem, use=use), whole.x, STEPS), use))
     return result, _values(best.descent.curve, result, table)
+
+
+def reported(found: Candidate) -> tuple[FitResult, Table]:
+    """Return the fit with the curve among what is given, and the curve with its intervals."""
+    descent, fit = found.descent, with_curve(found)
+    problem, x, curve = descent.at(0.0), descent.x(found.z), descent.curve
+    values, half = np.zeros(curve.knots.size), np.zeros(curve.knots.size)
+    values[curve.free] = x[descent.first : descent.after]
+    half[curve.free] = _half_widths(descent, problem, x, fit.outputs, fit.residual)
+    bands = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
+    damping = float(fit.problem.p[slot(curve.name, DAMPING)]) if curve.more else 0.0
+    return fit, Table(curve.place, tuple(curve.knots.tolist()), tuple(values.tolist()), bands, damping)
+
+
+def _half_widths(
+    descent: Descent, problem: Problem, x: FloatArray, outputs: Sequence[FloatArray], residual: FloatArray
+) -> FloatArray:
+    """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
+    derivative = jacobian_at(problem, x, outputs)
+    derivative[:, [*descent.held, *descent.named]] = 0.0  # recordings tell the sum of them and the curve
+    free = np.flatnonzero(derivative.any(axis=0))
+    j = derivative[:, free]
+    variance = float(residual @ residual) / effective_samples([residual])
+    scale = np.sqrt(np.maximum(np.diag(j.T @ j), 1e-300))
+    inverse = np.linalg.pinv((j / scale).T @ (j / scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
+    spread = np.zeros(x.size)
+    spread[free] = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance)
+    return Z95 * spread[descent.first : descent.after]
 
 
 Squares = tuple[float, float]

@@ -7,13 +7,14 @@ import pytest
 
 from estimator.diagnosis.inference.disturbances import Limits
 from estimator.diagnosis.inference.hypotheses import NOTHING, Hypothesis
+from estimator.diagnosis.table_curves import with_curve
 from estimator.diagnosis.table_words import looks_like, shortest_formula
 from estimator.diagnosis.tables import best_table, curve_through, widened_by_jackknife
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.simulate import simulate
 from estimator.physics.tables import Table
-from estimator.physics.unknowns import Shared
+from estimator.physics.unknowns import LOAD_TORQUE, Shared
 from estimator.signals.record import FloatArray, Record
 from tests.estimator.diagnosis.plain import Bench
 from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
@@ -85,6 +86,27 @@ def test_the_free_form_of_a_place_fits_all_samples() -> None:
     assert free is not None
     assert free.chosen_by < 0.5 * hypothesis.result.rms
     assert curve_through(hypothesis.result.first_outputs(), "load_angle") is None
+
+
+def test_a_curve_leaves_the_line_what_the_line_could_carry() -> None:
+    """A slope over the speed is viscous friction too, a level a constant load: recordings tell their sums alone."""
+    hypothesis = retuned(recorded({"quadratic_friction": {"quadratic_nm_s2": 0.4}}))
+    without = hypothesis.result.first_outputs()
+    free = curve_through(without, "motor_speed")
+    assert free is not None
+    assert free.descent.curve.values(free.z[free.descent.first : free.descent.after]).all()  # a level of its own
+    found = with_curve(free)
+    assert found.values_of("")["b_M"] == without.values_of("")["b_M"]
+    assert found.values_of("")["J_M"] != without.values_of("")["J_M"]
+    loads = [[each.local_of(i)[LOAD_TORQUE] for i in range(2)] for each in (without, found)]
+    assert loads[0][0] == loads[1][0]
+    assert loads[0][1] != loads[1][1]  # how much more the second recording has is seen
+    slack = curve_through(
+        retuned(recorded({"backlash": {"gap_rad": 0.02, "contact_rad": 0.0005}})).result, "shaft_twist"
+    )
+    assert slack is not None
+    anchor = slack.descent.curve.zero
+    assert slack.descent.curve.values(slack.z[slack.descent.first : slack.descent.after])[anchor] == 0.0
 
 
 def test_a_curve_is_fitted_next_to_a_limit_that_is_infinite() -> None:
