@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimator.design.open import Candidate, Open, name_of, precision_of
+from estimator.design.open import Candidate, Open, Unnamed, name_of, precision_of
 from estimator.design.paper import LEAST_PROBABILITY, TEMPERED
 from estimator.design.untested import with_untested
 from estimator.diagnosis.assemble import moved_values
@@ -15,16 +17,19 @@ from estimator.diagnosis.diagnose import SearchResult, answer
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
 from estimator.diagnosis.inference.decide import Judged
 from estimator.diagnosis.inference.fits import Fits
-from estimator.diagnosis.inference.hypotheses import Effects, Hypothesis, Progress, silent
+from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, Progress, silent
 from estimator.diagnosis.inference.moves import additions
 from estimator.diagnosis.inference.trials import necessity
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis, Verdict
+from estimator.diagnosis.table_curves import STRAIGHT
+from estimator.diagnosis.tables import Law
 from estimator.diagnosis.thresholds import Judging
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
 from estimator.physics.simulate import MASSES
+from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 
 MOST_OPEN = 4
@@ -84,7 +89,33 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         untested,
         named=named if diagnosis.verdict in (Verdict.EXPLAINED, Verdict.NO_MISMATCH) else None,
         traces=traces,
+        unnamed=None if found.law is None else _unnamed(found.law, best),
     )
+
+
+def _unnamed(law: Law, believed: Hypothesis) -> Unnamed | None:
+    """Return a law with the values of its curve as unknowns; None next to a load's free course, or of several outputs.
+
+    What recordings tell only together with the curve is held: what the line does straight on at its place, and the
+    value at one knot, which a constant load may have.
+    """
+    problem, table = law.final.problem, law.found.table
+    if GRADE in believed.effects or believed.outputs > 1:
+        return None
+    straight, size = STRAIGHT.get(table.place), float(np.abs(table.values).max())
+    line = tuple(
+        replace(each, low=x, high=x) if not each.effect and each.name == straight else each
+        for each, x in zip(problem.shared, law.final.x.tolist(), strict=False)
+    )
+    zero = int(np.argmin(np.abs(table.knots)))
+    values = {i: value for i, value in enumerate(table.values, start=1) if i - 1 != zero}
+    curve = tuple(
+        Shared(table.name, f"value_{i}", size, -math.inf, math.inf, value / size) for i, value in values.items()
+    )
+    x = np.insert(law.final.x, len(line), [each.start for each in curve])
+    released = replace(law.final, problem=replace(problem, shared=(*line, *curve)), x=x, derivative=None)
+    fit = replace(believed, result=released)
+    return Unnamed(table.place, Candidate(name_of(fit.effects), math.nan, fit, precision_of(fit)), law.line)
 
 
 def _larger(fits: Fits, judged: Judged) -> list[Hypothesis]:

@@ -43,6 +43,15 @@ class Untested:
 
 
 @dataclass(frozen=True, slots=True)
+class Unnamed:
+    """What the verdict leaves, as a law without a name."""
+
+    place: str  # key of ``PLACES``
+    fit: Candidate  # the verdict's set with it, the values of its curve among the unknowns
+    line: DrivelineModel  # the re-tuned model with the curve
+
+
+@dataclass(frozen=True, slots=True)
 class Open:
     """What recordings leave open."""
 
@@ -53,12 +62,18 @@ class Open:
     supposed: Mapping[str, Untested] = field(default_factory=dict)  # those of them that have a size to suppose
     named: Effects | None = None  # what the verdict names; None where it leaves something without a name
     traces: Effects = frozenset()  # seen, and too small to matter: with or without them, the verdict is the same
+    unnamed: Unnamed | None = None  # a law without a name that makes the free run better, where one was found
 
     @property
     def records(self) -> tuple[Record, ...]:
         """The recordings so far, by their first outputs."""
         problem = self.candidates[0].fit.result.problem
         return problem.records[: len(problem.bases)]
+
+    @property
+    def foremost(self) -> tuple[Candidate, DrivelineModel]:
+        """What simulates best, with the line it is added to: what an experiment is driven with on paper."""
+        return (self.candidates[0], self.line) if self.unnamed is None else (self.unnamed.fit, self.unnamed.line)
 
     @property
     def against(self) -> tuple[Candidate, ...]:

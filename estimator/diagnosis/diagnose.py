@@ -23,7 +23,7 @@ from estimator.diagnosis.inference.search import Search, searched
 from estimator.diagnosis.preconditions.prepare import Prepared, prepare
 from estimator.diagnosis.result import Diagnosis
 from estimator.diagnosis.say import Basis, effort_of, said, undecided, warnings_of
-from estimator.diagnosis.tables import free_form, unnamed_law
+from estimator.diagnosis.tables import Law, free_form, unnamed_law
 from estimator.diagnosis.thresholds import Telling
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import TimeIsUp, Work, counted
@@ -40,6 +40,7 @@ class SearchResult:
     chain: Chain  # recordings, and the faults of their acquisition
     search: Search  # the way to the best set
     decision: Decision  # what is believed of it
+    law: Law | None  # one without a name, next to it
 
 
 def diagnose(
@@ -114,10 +115,10 @@ def answer(
             read, search = searched(chain, line, work, Telling.LEVELS[level], started.append, progress)
             progress("weighing what was found", 0.8)
             decision = decide(search, read, Unseen(line, with_faults_compensated(ready.holdout)), free_form)
-            keep(SearchResult(read, search, decision))
             progress("simulating what was found", 0.9)
             effort, warnings = effort_of(search, level, decision), warnings_of(search, level)
             law = unnamed_law(decision)
+            keep(SearchResult(read, search, decision, law))
             diagnosis = said(Basis(decision, search, model, effort, warnings, law, ready.doubts))
         except TimeIsUp:
             diagnosis = undecided(started[-1] if started else None, chain, line, model, work, level, ready.doubts)

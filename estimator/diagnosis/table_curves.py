@@ -31,11 +31,12 @@ from estimator.physics.unknowns import LOAD_TORQUE, Shared
 from estimator.signals.record import BoolArray, FloatArray
 
 STRAIGHT = {"shaft_twist": "k", "shaft_rate": "c", "motor_speed": "b_M", "load_speed": "b_L"}
-"""Parameter of the line that a straight curve at a place does the same as: it stays as it is without the curve."""
+"""Parameter of the line that a straight curve at a place does the same as."""
 
 LEVELLED = frozenset({"torque", "motor_speed", "load_speed"})
-"""Places at which a curve that is constant does the same as a constant load: the load of the first recording stays as
-it is without the curve. In a shaft a constant torque is a turn of its twist's zero, and the curve is 0 at one knot."""
+"""Places at which a curve that is constant does the same as a constant load. The load of the first recording stays as
+it is without the curve there, and so does the friction that a straight curve is. In a shaft a constant torque is a turn
+of its twist's zero, and the curve is 0 at one knot; its stiffness is part of the torque over the twist, and moves."""
 
 YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 """A torque over the twist that yields, as a clutch slips: a straight curve and the slider of this effect."""
@@ -256,18 +257,21 @@ class Descent:
         low, high = bounds(self.problem)
         slopes = slice(self.first, self.first + curve.pieces)
         low[slopes], high[slopes] = curve.most
-        self.held = self._straight()
-        low[self.held] = high[self.held] = self.start(np.empty(0))[self.held]
+        held = [*self.straight, self._load()] if curve.place in LEVELLED else []
+        low[held] = high[held] = self.start(np.empty(0))[held]
         self.low, self.high = low, high
 
-    def _straight(self) -> list[int]:
-        """Return where what stays as it is without the curve stands: a slope of the line, a constant load."""
-        place, known = self.curve.place, self.problem.shared[: self.first]
-        names = {STRAIGHT.get(place), LOAD} if place in LEVELLED else {STRAIGHT.get(place)}
-        found = [i for i, each in enumerate(known) if not each.effect and each.name in names]
-        if place in LEVELLED and all(each.name != LOAD for each in known):
-            found.append(len(self.problem.shared) + LOAD_TORQUE)
-        return found
+    def _load(self) -> int:
+        """Return where the constant load of all recordings stands, or that of the first."""
+        known = self.problem.shared[: self.first]
+        common = [i for i, each in enumerate(known) if not each.effect and each.name == LOAD]
+        return common[0] if common else len(self.problem.shared) + LOAD_TORQUE
+
+    @property
+    def straight(self) -> list[int]:
+        """Where the line's parameter stands that a straight curve does the same as; nothing where there is none."""
+        known, name = self.problem.shared[: self.first], STRAIGHT.get(self.curve.place)
+        return [i for i, each in enumerate(known) if not each.effect and each.name == name]
 
     @property
     def named(self) -> list[int]:

@@ -241,8 +241,8 @@ def _half_widths(
 ) -> FloatArray:
     """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
     derivative = jacobian_at(problem, x, outputs)
-    derivative[:, [*descent.held, *descent.named]] = 0.0  # recordings tell the sum of them and the curve
-    free = np.flatnonzero(derivative.any(axis=0))
+    derivative[:, [*descent.straight, *descent.named]] = 0.0  # recordings tell the sum of them and the curve
+    free = np.flatnonzero(derivative.any(axis=0) & (descent.low < descent.high))
     j = derivative[:, free]
     variance = float(residual @ residual) / effective_samples([residual])
     scale = np.sqrt(np.maximum(np.diag(j.T @ j), 1e-300))

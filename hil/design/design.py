@@ -15,6 +15,7 @@ from drivers.errors import CommandRefused
 from estimator.design.open import Open
 from estimator.design.paper import Expected, Width, as_model, expected, shown, widths
 from estimator.physics.model import DrivelineModel
+from estimator.physics.tables import PREFIX
 from estimator.signals.record import Record
 from hil.design.candidates import ExperimentDict, Limits, candidates
 from hil.errors import InputError, RunAborted, UsageError
@@ -45,6 +46,7 @@ class Aim(Enum):
 
     DECIDE = "decide"
     PARAMETERS = "parameters"
+    LAW = "law"  # what it is where nothing is to be decided and a law without a name is left: not asked for by itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,7 @@ class Design:
         """Whether it tells enough to take the vehicle out."""
         if self.aim is Aim.DECIDE and self.shows:
             return True
-        if self.aim is Aim.DECIDE and self.decides is None:
+        if (self.aim is Aim.DECIDE and self.decides is None) or (self.aim is Aim.LAW and not _wide(self.widths)):
             return False
         return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE_INTERVAL)
 
@@ -115,7 +117,7 @@ def designed(
     """
     rig = source.rig()
     limits = Limits.of(rig)
-    model = as_model(known.candidates[0], known.line)
+    model = as_model(*known.foremost)
     found: list[_Judged] = []
     every = list(candidates(rig, limits))
     refused = {name: left_out[name] for name, _ in every if name in left_out}
@@ -138,6 +140,8 @@ def designed(
         )
     decide = [each for each in found if each.decides is not None and each.decides.factor >= WORTH]
     shows = [each for each in found if each.shows]
+    if aim is Aim.DECIDE and not decide and not shows and known.unnamed is not None:
+        aim, found = Aim.LAW, [_judged(known, each.planned, Aim.LAW) for each in found]
     chosen = _best(decide) if decide else max(shows, key=_most_shown) if shows else _best(found)
     decides = chosen.decides if decide or not shows else None
     others = tuple((each.planned.name, each.value(decides)) for each in found if each is not chosen)
@@ -146,7 +150,7 @@ def designed(
         free_key(list(rig.experiments)),
         chosen.planned,
         decides,
-        _widths(known, chosen.planned),
+        _widths(known, chosen.planned, aim),
         tuple(chosen.shows),
         tuple(sorted(others, key=lambda each: -each[1])),
         refused,
@@ -170,8 +174,8 @@ class _Judged:
 
 
 def _judged(known: Open, planned: Planned, aim: Aim) -> _Judged:
-    if aim is Aim.PARAMETERS:
-        return _Judged(planned, None, {}, _shortened(_widths(known, planned)))
+    if aim is not Aim.DECIDE:
+        return _Judged(planned, None, {}, _shortened(_widths(known, planned, aim)))
     is_single = len(known.candidates) == 1 or known.is_decided
     decides = None if is_single else expected(known, planned.record)
     return _Judged(planned, decides, shown(known, planned.record), math.nan)
@@ -195,11 +199,15 @@ def _most_shown(judged: _Judged) -> tuple[int, float, float]:
 
 def is_needed(known: Open, aim: Aim) -> bool:
     """Tell whether there is anything that an experiment could tell."""
-    return aim is Aim.PARAMETERS or bool(known.untested) or (len(known.candidates) > 1 and not known.is_decided)
+    if aim is Aim.PARAMETERS or known.untested or known.unnamed is not None:
+        return True
+    return len(known.candidates) > 1 and not known.is_decided
 
 
-def _widths(known: Open, planned: Planned) -> tuple[Width, ...]:
-    return tuple(widths(known.candidates[0], known.line, planned.record))
+def _widths(known: Open, planned: Planned, aim: Aim) -> tuple[Width, ...]:
+    """Return how well values are known now, and then; those of the curve alone where a law is what it is for."""
+    found = tuple(widths(*known.foremost, planned.record))
+    return tuple(each for each in found if aim is not Aim.LAW or each.name.startswith(PREFIX))
 
 
 def on_paper(source: RigSource, name: str, table: ExperimentDict, model: DrivelineModel, limits: Limits) -> Planned:
@@ -223,8 +231,15 @@ def _record(name: str, period_s: float, prediction: Prediction) -> Record:
 
 def _shortened(values: Sequence[Width]) -> float:
     """Return the mean factor by which the intervals that are wide become shorter; all, where none is."""
-    wide = [each for each in values if each.now > WIDE_INTERVAL * abs(each.value)] or list(values)
+    wide = _wide(values) or list(values)
     return math.exp(float(np.mean([math.log(max(each.now, 1e-300) / max(each.after, 1e-300)) for each in wide])))
+
+
+def _wide(values: Sequence[Width]) -> list[Width]:
+    """Return the intervals that are wide; those of a curve against its largest value: one of its values may be 0."""
+    of_curve = max((abs(each.value) for each in values if each.name.startswith(PREFIX)), default=0.0)
+    sizes = (of_curve if each.name.startswith(PREFIX) else abs(each.value) for each in values)
+    return [each for each, size in zip(values, sizes, strict=True) if each.now > WIDE_INTERVAL * size]
 
 
 def free_key(taken: Sequence[str]) -> str:

@@ -14,6 +14,7 @@ import tomlkit
 from estimator.design.open import Candidate, Open, name_of
 from estimator.design.paper import Width
 from estimator.physics.catalogue import title_of
+from estimator.physics.tables import PLACES
 from hil.design.design import WORTH, Aim, Design, Planned
 from hil.figures.drawn import drawing, require_matplotlib
 
@@ -36,6 +37,9 @@ def question_lines(known: Open) -> Iterator[str]:
     first, *rivals = known.candidates
     if known.named is None:
         yield f"No explanation leaves only noise; the best so far: {in_words(first.name)}."
+        if known.unnamed is not None:
+            over = PLACES[known.unnamed.place].over
+            yield f"A law without a name is left, a torque over {over}: an experiment can make its curve known better."
     elif not rivals:
         yield f"One explanation is left: {in_words(first.name)}."
     if rivals:
@@ -128,6 +132,8 @@ def obstacle(design: Design) -> str:
     """
     if design.decides is None and design.aim is Aim.DECIDE:
         return "no experiment that this rig may drive shows one of these"
+    if design.aim is Aim.LAW:
+        return "no experiment that this rig may drive makes the curve's intervals clearly shorter"
     if design.aim is Aim.PARAMETERS:
         return "no experiment that this rig may drive makes intervals clearly shorter"
     gained = math.log(max(design.factor, 1.0))

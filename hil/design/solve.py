@@ -15,6 +15,7 @@ from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.physics.catalogue import title_of
 from estimator.physics.driveline import Load
 from estimator.physics.model import DrivelineModel
+from estimator.physics.tables import PLACES
 from estimator.signals.record import Record
 from hil.config.model_file import ModelFile
 from hil.design.design import Aim, Design, NothingAllowed, designed, is_needed
@@ -218,7 +219,8 @@ class Solving:
 def _undecidable(known: Open, diagnosis: Diagnosis) -> str:
     """Say why a verdict is no decision though nothing is left to drive for it."""
     if diagnosis.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED):
-        return "what is left has no name in the catalogue, and an experiment is designed to decide between names"
+        law = "" if known.unnamed is None else f": a torque over {PLACES[known.unnamed.place].over} is in the model"
+        return f"what is left has no name in the catalogue{law}"
     if known.against:
         rivals = "; ".join(f"{as_rival(each)} ({each.probability:.2f})" for each in known.against)
         return f"the verdict names {in_words(name_of(known.named or frozenset()))}, and the odds leave {rivals}"

@@ -109,7 +109,14 @@ class World:
         left = [SimpleNamespace(name=name, probability=p, effects=frozenset({name})) for name, p in odds.items()]
         decided = odds is DECIDED
         known = SimpleNamespace(
-            candidates=left, is_decided=decided, named=left[0].effects, against=(), untested=(), supposed={}, twins={}
+            candidates=left,
+            is_decided=decided,
+            named=left[0].effects,
+            against=(),
+            untested=(),
+            supposed={},
+            twins={},
+            unnamed=None,
         )
         return known, SimpleNamespace(verdict=Verdict.EXPLAINED, statement=f"after {len(records)} recordings")
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
 
-from estimator.design.paper import Expected
-from hil.design.design import NEARLY, Planned, _best as best, _Judged as Judged
+from estimator.design.paper import Expected, Width
+from hil.design.design import NEARLY, Aim, Design, Planned, _best as best, _Judged as Judged
 
 
 def judged(seconds: float, right: float | None, odds: float = 1.0, **shows: float) -> Judged:
@@ -34,6 +35,22 @@ CLEARER = {
 def test_what_tells_most_is_driven(worse: Judged, better: Judged) -> None:
     assert best([worse, better]) is better
     assert best([better, worse]) is better
+
+
+CURVE = (
+    Width("table_motor_speed.value_1", 0.1, 1.5, 0.7, "Nm"),
+    Width("table_motor_speed.value_2", 12.0, 0.5, 0.3, "Nm"),
+)
+
+
+@pytest.mark.parametrize(("now", "is_worth"), [(1.5, True), (0.9, False)])
+def test_a_curve_is_measured_until_it_is_known_to_a_share_of_its_largest_value(now: float, is_worth: bool) -> None:
+    """A tenth of 12 Nm; a value of 0.1 Nm need not be known to a tenth of itself."""
+    first, second = CURVE
+    widths = (replace(first, now=now), second)
+    design = Design(Aim.LAW, "next_1", cast("Planned", None), None, widths, (), (), {})
+    assert design.is_worth_driving is is_worth
+    assert design.factor == pytest.approx(now / 0.7 if is_worth else math.sqrt(now / 0.7 * 0.5 / 0.3))
 
 
 def test_clarity_is_no_reason_to_be_less_probable() -> None:

@@ -32,7 +32,10 @@ def solving(driven: list[str], given: list[Path], most_vehicle_s: float = 600.0,
 def decided_on(*effects: str) -> Any:
     """What a diagnosis leaves open: nothing; it names these effects."""
     candidate = SimpleNamespace(effects=frozenset(effects))
-    return cast("Any", SimpleNamespace(is_decided=True, named=frozenset(effects), untested=(), candidates=(candidate,)))
+    return cast(
+        "Any",
+        SimpleNamespace(is_decided=True, named=frozenset(effects), untested=(), candidates=(candidate,), unnamed=None),
+    )
 
 
 def test_nothing_missing_is_decided_when_the_rigs_own_experiments_are_all_driven() -> None:

@@ -8,9 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.design.left_open import _larger as larger
+from estimator.design.left_open import _larger as larger, left_open
 from estimator.design.open import Candidate, Open, Untested, name_of, precision_of as precision
-from estimator.design.paper import LEAST_DIFFERENCE, _on_paper as on_paper, as_model, distance, expected, shown, widths
+from estimator.design.paper import (
+    LEAST_DIFFERENCE,
+    Width,
+    _on_paper as on_paper,
+    as_model,
+    distance,
+    expected,
+    shown,
+    widths,
+)
 from estimator.design.untested import with_untested
 from estimator.diagnosis.inference.decide import Judged
 from estimator.diagnosis.inference.descent import THOROUGH, descended
@@ -24,12 +33,14 @@ from estimator.physics.fit import not_fitted
 from estimator.physics.layout import flat, grid_for
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
+from estimator.physics.tables import Table
 from estimator.physics.unknowns import own_unknowns
-from estimator.signals.record import Record, separated_outputs
+from estimator.signals.record import FloatArray, Record, separated_outputs
 from tests.estimator.diagnosis.one_effect import SEEDS, Bench, bench_with
 from tests.estimator.diagnosis.planted import SAMPLES, SIGMA, drive_torque
+from tests.estimator.diagnosis.test_best_table import recorded
 from tests.estimator.diagnosis.test_several_outputs import SHAFT_TORQUE, with_output
-from tests.estimator.physics.bench import random_steps, record
+from tests.estimator.physics.bench import TWO_MASS, model, random_steps, record
 
 NAMES = ["coulomb_friction_motor", "coulomb_friction_load"]
 
@@ -64,11 +75,15 @@ def test_what_pushed_the_vehicle_pushes_it_on_paper(known: Open) -> None:
 
 def driven(known: Open, torque_nm: float, cycles: int = 400) -> Record:
     """Back and forth through standstill, as the first hypothesis lets the motor turn."""
-    model = as_model(known.candidates[0], known.line)
     turns = np.where(np.arange(cycles) // 100 % 2 == 0, torque_nm, -torque_nm)
-    silent = record(turns, np.zeros(cycles), name="paper")
-    output = simulate(grid_for(model, [silent]), silent, flat(model), InitialCondition(0.0, 0.0, 0.0))
-    return record(turns, output, name="paper")
+    return record(turns, simulated(known, turns), name="paper")
+
+
+def simulated(known: Open, torque_nm: FloatArray) -> FloatArray:
+    """The motor's speed under a torque, as what simulates best has it."""
+    line = as_model(*known.foremost)
+    silent = record(torque_nm, np.zeros(torque_nm.size), name="paper")
+    return simulate(grid_for(line, [silent]), silent, flat(line), InitialCondition(0.0, 0.0, 0.0))
 
 
 def with_share(of: Record, share: float) -> Record:
@@ -207,6 +222,28 @@ def test_a_likely_effect_that_the_verdict_does_not_name_is_another_explanation()
 
 
 FILTER = ("speed_filter", {"time_constant_s": 0.01, "shape": 0.0})
+
+
+def test_a_law_without_a_name_is_measured_where_its_curve_is_least_known() -> None:
+    """A torque over the twist that no effect has; its outer values are known worst; a strong drive reaches them."""
+    knots = np.linspace(-0.04, 0.04, 13)
+    table = Table("shaft_twist", tuple(knots.tolist()), tuple((40.0 * np.sin(knots / 0.006)).tolist()))
+    law = {table.name: {key: each.value for key, each in table.effect().items()}}
+    left, _ = left_open(recorded(law), model(TWO_MASS, tolerance=0.1), "quick")
+    assert left.unnamed is not None
+    assert left.foremost == (left.unnamed.fit, left.unnamed.line)
+    assert left.named is None
+
+    def curve(size_nm: float) -> list[Width]:
+        steps = random_steps(1500, seed=7, size_nm=size_nm, hold=15)
+        on_paper = record(steps, simulated(left, steps), name="paper")
+        return [each for each in widths(*left.foremost, on_paper) if each.name.startswith(table.name)]
+
+    weak, strong = curve(2.0), curve(60.0)
+    assert len(weak) == left.unnamed.line.effects[table.name]["knots"].value - 1.0  # one is held: a constant load
+    assert all(each.after <= each.now for each in (*weak, *strong))
+    least_known = max(range(len(weak)), key=lambda i: weak[i].now)
+    assert strong[least_known].after < weak[least_known].after < weak[least_known].now
 
 
 @pytest.mark.parametrize("bench", [bench_with(*FILTER), with_output(SHAFT_TORQUE, *FILTER)], ids=["one", "two outputs"])

@@ -17,7 +17,8 @@ as read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -336,37 +337,62 @@ class FreeLine:
 
 
 def free_line(fits: Fits) -> FreeLine | None:
-    """Fit the nominal line beyond its tolerances; None where these hold nothing back."""
+    """Fit the nominal line beyond its tolerances; None where these hold nothing back.
+
+    One value alone is off its sheet where that simulates as well as all of them: two frictions show by their sum at
+    a steady speed, and a fit of both spreads over both what is wrong with one.
+    """
     nothing = fits.nothing().result
     shared = nothing.problem.shared
-    trusted = [not s.effect and np.isfinite(s.low) and s.low < s.high for s in shared]
-    if not any(free and at_bound for free, at_bound in zip(trusted, nothing.pinned, strict=False)):
+    trusted = {s.name for s in shared if not s.effect and np.isfinite(s.low) and s.low < s.high}
+    at_bound = [s.name for s, pinned in zip(shared, nothing.pinned, strict=False) if pinned and s.name in trusted]
+    if not at_bound:
         return None
+    whole = _freed(fits, trusted)
+    each_alone = (_freed(fits, {name}) for name in at_bound)
+    alone = min((each for each in each_alone if each is not None), key=lambda each: each.score, default=None)
+    if whole is None or alone is None:
+        return whole or alone
+    as_good = alone.leaves_noise or not whole.leaves_noise
+    return alone if as_good and not whole.tried(fits.model).clearly_beats(alone.tried(fits.model)) else whole
+
+
+def _freed(fits: Fits, names: Collection[str]) -> FreeLine | None:
+    """Fit the nominal line with some of its values free; None where none of these clearly leaves its tolerance."""
+    nothing = fits.nothing().result
+    shared = nothing.problem.shared
     # a joint has nothing to integrate: of its stiffness and damping, one may be none at all
     least = 0.0 if nothing.problem.grid.structure is Structure.JOINT else 1.0 / Judging.FREELY
     freed = tuple(
-        replace(s, low=min(s.low, least), high=max(s.high, Judging.FREELY)) if free else s
-        for s, free in zip(shared, trusted, strict=True)
+        replace(s, low=min(s.low, least), high=max(s.high, Judging.FREELY)) if not s.effect and s.name in names else s
+        for s in shared
     )
     problem = replace(nothing.problem, shared=freed)
     sizes = fits.nothing().sizes
     initial = not_fitted(problem, nothing.x)
     found = fitted(NOTHING, initial, sizes, fits.limits, fits.catalogue, fits.nothing().minus_twice_log)
-    off_nominal = _off_nominal(fits, found)
+    off_nominal = _off_nominal(fits, found, names)
     if not off_nominal:
         return None
-    chosen = Catalogue(fits.model, len(fits.names) + sum(trusted)).choices(frozenset(each.name for each in off_nominal))
+    chosen = Catalogue(fits.model, len(fits.names) + len(shared)).choices(frozenset(each.name for each in off_nominal))
     return FreeLine(found, found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 
-def _off_nominal(fits: Fits, found: Hypothesis) -> tuple[OffNominal, ...]:
-    spread = np.sqrt(np.maximum(np.diag(covariance_of_innovations(found)), 0.0))
+def _off_nominal(fits: Fits, found: Hypothesis, freed: Collection[str]) -> tuple[OffNominal, ...]:
+    """Return what has clearly left its tolerance, the clearest first.
+
+    The standard error of one that is freed alone is that of a line whose other values are held nowhere: what it gains
+    in likelihood says how clear it is (Wilks, Ann. Math. Stat. 9, 1938).
+    """
+    nothing = fits.nothing()
+    spread = np.sqrt(np.maximum(np.diag(covariance_of_innovations(found)), np.finfo(float).tiny))
+    gained = math.sqrt(max(nothing.minus_twice_log - found.minus_twice_log, 0.0))
     clear = []
-    for i, trusted in enumerate(fits.nothing().result.problem.shared):
+    for i, trusted in enumerate(nothing.result.problem.shared):
         ratio = float(found.result.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
-        if not trusted.effect and trusted.low < trusted.high and by > Judging.CLEARLY * spread[i]:
-            sureness = by / max(float(spread[i]), np.finfo(float).tiny)
+        sureness = gained if len(freed) == 1 else by / float(spread[i])
+        if not trusted.effect and trusted.low < trusted.high and by > 0.0 and sureness > Judging.CLEARLY:
             given, unit = fits.model.parameters[trusted.name], parameter_unit(trusted.name, fits.model.motion)
             clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
     return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))

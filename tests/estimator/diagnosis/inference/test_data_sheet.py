@@ -44,6 +44,17 @@ def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, fac
     assert line.score < search.nothing().score
 
 
+def test_one_of_two_frictions_that_recordings_tell_by_their_sum_is_off_alone() -> None:
+    """Freed together neither clearly leaves its tolerance, and a law of friction would be named for either."""
+    line = free_line(searched({"b_M": 2.8}))
+    assert line is not None
+    (value,) = line.off_nominal
+    assert value.name == "b_M"
+    known_to = 0.1 * TWO_MASS["b_L"] / (TWO_MASS["b_M"] / 2.8)  # the other one may have what is within its tolerance
+    assert value.ratio == pytest.approx(2.8, abs=known_to)
+    assert line.leaves_noise
+
+
 def test_inside_its_tolerances_nothing_is_beyond() -> None:
     assert free_line(searched({"k": 1.08})) is None
 
