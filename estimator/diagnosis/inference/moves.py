@@ -14,6 +14,7 @@ import numpy as np
 
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis, open_hypotheses
+from estimator.diagnosis.inference.remainder import tests
 from estimator.diagnosis.inference.score_tests import ScoredStart, Screen, WeightedScoreTests, promising
 from estimator.diagnosis.priors import EffectPriors
 from estimator.diagnosis.thresholds import Searching
@@ -58,14 +59,22 @@ def _most_probable(fits: Fits, found: Sequence[Hypothesis], current: Hypothesis)
 
 
 def additions(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
-    """Return sets with one effect more, the best few fitted to their end."""
-    view = fits.view(current)
+    """Return sets with one effect more, the best few fitted to their end.
+
+    Where a set leaves what noise would leave, only effects are fitted that promise more than they cost.
+    """
+    view, is_more = fits.view(current), any(test.failed for test in tests(current))
     looked = _looked(view, [name for name in _open(fits, current) if name not in current.effects], current)
     price = _price(current)
     fits.foreseen.update({name: current.score - starts[0].promise + price for name, starts in looked.items()})
-    starts = {**_worth_fitting(current, looked), **_at_moments(view, looked, _promised_moments(looked), price)}
+    some = Searching.FEWEST_FITS if is_more else 0
+    starts = {
+        **_worth_fitting(current, looked, some=some),
+        **_at_moments(view, looked, _promised_moments(looked), price),
+    }
     fits.learn(current, view)
-    missed = [each for each in _most_missed(fits, current, list(looked)) if _is_elsewhere(*each, starts)]
+    missed = _most_missed(fits, current, list(looked)) if is_more else []
+    missed = [each for each in missed if _is_elsewhere(*each, starts)]
     tried = [*starts.items(), *((name, [start]) for name, start in missed)]
     rough = concurrently(lambda each: fits.added(current, *each), tried)
     most = Searching.FINISHED if current.effects else Searching.STARTS
@@ -127,9 +136,7 @@ def _looked(view: Screen, names: Sequence[str], around: Hypothesis) -> dict[str,
     return dict(zip(tried, concurrently(view.starts, tried), strict=True))
 
 
-def _worth_fitting(
-    current: Hypothesis, looked: Starts, least: float = 0.0, some: int = Searching.FEWEST_FITS
-) -> Starts:
+def _worth_fitting(current: Hypothesis, looked: Starts, least: float = 0.0, some: int = 0) -> Starts:
     """Return the starts of the effects that are worth a fit, the most promising first; ``some`` in any case."""
     order = sorted(looked, key=lambda name: -looked[name][0].promise)
     least = max(least, Searching.WORTH_FITTING * looked[order[0]][0].promise if order else 0.0)
@@ -218,7 +225,7 @@ def _nearest(fits: Fits, current: Hypothesis, name: str) -> tuple[Hypothesis | N
     looked = _looked(view, alike, reduced)
     least = Searching.SAME_PROMISE * view.starts(name)[0].promise if name != GRADE else 0.0
     moments = moments_of(current.result, name) if name != GRADE and EFFECTS[name].event else _promised_moments(looked)
-    starts = {**_worth_fitting(reduced, looked, least, some=0), **_at_moments(view, looked, moments, _price(reduced))}
+    starts = {**_worth_fitting(reduced, looked, least), **_at_moments(view, looked, moments, _price(reduced))}
     rough = [fits.added(reduced, other, starts[other], current) for other in starts]
     near = current.score + Searching.NEARLY * _gain(current, reduced)
     found = [each for each in rough if each is not None and each.score < near]

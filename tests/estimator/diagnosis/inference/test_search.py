@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.decide import Decision
+from estimator.diagnosis.inference.hypotheses import GRADE
 from estimator.physics.model import EffectValue
 from tests.estimator.diagnosis.one_effect import Bench, bench_with, decided, searched
 from tests.estimator.diagnosis.planted import SIGMA
@@ -25,6 +26,13 @@ def test_nothing_is_named_where_nothing_is_missing() -> None:
     judged = decided_with(*PLAIN).judged
     assert judged.named == judged.traces == judged.failed == judged.refinements == ()
     assert judged.believed.hypothesis.result.rms == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_where_noise_is_left_only_what_promises_more_than_it_costs_is_fitted() -> None:
+    fits = searched(bench_with(*PLAIN)).fits
+    fitted = {name for effects in (*fits.rough, *fits.ended) for name in effects - {GRADE}} | {*fits.implausible}
+    assert fitted <= {name for name, score in fits.foreseen.items() if score < fits.nothing().score}
+    assert len(fitted) < len(fits.foreseen)
 
 
 @pytest.mark.parametrize(
