@@ -53,7 +53,10 @@ def left_open(
 
 
 def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) -> Open:
-    """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does."""
+    """Return the verdict's set and those as probable that do not simulate worse; none counts for more than it does.
+
+    What the verdict says could as well be there counts as much: one of these is named by the likelihood alone.
+    """
     search, judged = found.search, found.decision.judged
     best = judged.believed.hypothesis
     near = {
@@ -63,9 +66,12 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         and not _holds(each.effects, best.effects)
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
     }
-    near |= {each.effects: each for each in (*_larger(search.fits, judged), best)}
+    alike = _alike(search.fits, judged)
+    near |= {each.effects: each for each in (*_larger(search.fits, judged), *alike, best)}
     lowest = min(each.score for each in near.values())
-    behind = {effects: each.score - lowest for effects, each in near.items()} | {best.effects: 0.0}
+    behind = {effects: each.score - lowest for effects, each in near.items()} | dict.fromkeys(
+        (best.effects, *(each.effects for each in alike)), 0.0
+    )
     within = max(Judging.ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     ordered: list[Hypothesis] = []
     likely = (effects for effects in near if behind[effects] < within)
@@ -116,6 +122,13 @@ def _unnamed(law: Law, believed: Hypothesis) -> Unnamed | None:
     released = replace(law.final, problem=replace(problem, shared=(*line, *curve)), x=x, derivative=None)
     fit = replace(believed, result=released)
     return Unnamed(table.place, Candidate(name_of(fit.effects), math.nan, fit, precision_of(fit)), law.line)
+
+
+def _alike(fits: Fits, judged: Judged) -> list[Hypothesis]:
+    """Return the sets with a look-alike in the place of one of the verdict's names."""
+    effects = judged.believed.effects
+    exchanged = (effects - {each.name} | {other} for each in judged.named for other in each.alike)
+    return [fits.ended[each] for each in exchanged if each in fits.ended]
 
 
 def _larger(fits: Fits, judged: Judged) -> list[Hypothesis]:

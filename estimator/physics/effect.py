@@ -86,6 +86,7 @@ class EffectParameter:
     own: bool = False  # true where each recording has its own value, which no model file holds
     most: float = math.inf  # largest value that makes sense in a model, whatever the data
     form: str = ""  # name of the law's form where this parameter shapes it
+    outlasts: bool = False  # true of an own one that continues from one recording to the next: none before the first
 
     def unit(self, motion: Motion) -> str:
         """Return the parameter's unit in a kind of motion."""

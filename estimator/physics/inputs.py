@@ -29,6 +29,7 @@ _LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
 _DEPTH = slot("torque_derating", "depth")
 _DERATING_TIME = slot("torque_derating", "time_constant_s")
 _HEATED = slot("torque_derating", "heating_nm")
+_WARM = slot("torque_derating", "warm")
 DECLARED = [
     (e.acting.law, [slot(e.name, each.name) for each in e.parameters], e.parameters[0].null)
     for e in BUILT_IN.values()
@@ -36,7 +37,7 @@ DECLARED = [
 ]
 """Laws of entries at this place, where their parameters are, and at which value of the first they do nothing."""
 
-_WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED]
+_WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED, _WARM]
 _TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
 _PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places), *_TABLE])
 """Where all stands that ``shaft_torque`` depends on."""
@@ -68,7 +69,7 @@ def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: Fl
     """
     if p[_HEATED] <= 0.0:
         rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
-        return np.asarray(-np.expm1(-rows_and_end / p[_DERATING_TIME]))
+        return np.asarray(1.0 - (1.0 - p[_WARM]) * np.exp(-rows_and_end / p[_DERATING_TIME]))
     from scipy.signal import lfilter  # half a second that few need
 
     kept = float(np.exp(-period_s / p[_DERATING_TIME]))
@@ -80,7 +81,7 @@ def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: Fl
 def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
     """Return the torque on the motor shaft, shape (N,) [Nm], of a recording; see ``shaft_torque_from``."""
     period_s = float(since_start_s[1] - since_start_s[0]) if since_start_s.size > 1 else 0.0
-    return shaft_torque_from(torque_nm, since_start_s, period_s, p, 0.0)[0]
+    return shaft_torque_from(torque_nm, since_start_s, period_s, p, float(p[_WARM]))[0]
 
 
 def shaft_torque_from(

@@ -6,7 +6,7 @@ The vector of unknowns is ``[shared ..., local of record 0 ..., local of record 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,7 +94,7 @@ def effect_unknowns(name: str, model: DrivelineModel, records: Sequence[Record])
     name = model.own(name)
     entry = EFFECTS[name]
     if entry.profile:
-        return [Release((), tuple(_own_unknowns(entry, record) for record in records))]
+        return [Release((), own_of_each([name], records))]
     return released(name, model, records, entry.starts(model, records))
 
 
@@ -103,7 +103,7 @@ def released(
 ) -> list[Release]:
     """Return an effect's parameters as unknowns from start points in units of its scales."""
     entry = EFFECTS[name]
-    own = tuple(_own_unknowns(entry, record) for record in records)
+    own = own_of_each([name], records)
     scales = entry.scales(model, records)
     return [
         Release(
@@ -115,6 +115,21 @@ def released(
         )
         for start in starts
     ]
+
+
+def own_of_each(names: Iterable[str], records: Sequence[Record]) -> tuple[tuple[Shared, ...], ...]:
+    """Return the unknowns that effects have in each of some recordings, the first of them the earliest.
+
+    What continues from one recording to the next is counted from the first one: what that began with is part of the
+    line's own values.
+    """
+    names, found = list(names), []
+    for record in records:
+        is_first = record is records[0] or record.lead is records[0]
+        lasting = {(name, p.name) for name in names for p in EFFECTS[name].own_parameters if p.outlasts and is_first}
+        own = own_unknowns(names, record)
+        found.append(tuple(replace(u, low=u.start, high=u.start) if (u.effect, u.name) in lasting else u for u in own))
+    return tuple(found)
 
 
 def own_unknowns(names: Iterable[str], record: Record) -> tuple[Shared, ...]:

@@ -221,6 +221,20 @@ def test_a_likely_effect_that_the_verdict_does_not_name_is_another_explanation()
     assert larger(fits, Judged(nothing, named, named)) == []
 
 
+def test_what_the_verdict_says_could_as_well_be_there_is_not_decided() -> None:
+    """A lag simulates as well as the delay that is there; their likelihoods alone differ, and one more drive decides."""
+    bench = bench_with("transport_delay", {"delay_s": 0.004})
+    left, diagnosis = left_open(bench.records, bench.model, "quick")
+    (named,) = diagnosis.effects
+    assert named.name == "transport_delay"
+    assert "actuator_lag" in named.indistinguishable_from
+    assert {(each.name, each.probability) for each in left.candidates} >= {
+        ("transport_delay", 0.5),
+        ("actuator_lag", 0.5),
+    }
+    assert not left.is_decided
+
+
 FILTER = ("speed_filter", {"time_constant_s": 0.01, "shape": 0.0})
 
 

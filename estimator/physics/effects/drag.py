@@ -280,12 +280,15 @@ WARMING_FRICTION = Effect(
     name="warming_friction",
     element=Element.LOAD,
     title="friction of warming oil",
-    law="b_L becomes b_L + b_cold exp(-t / tau)",
+    law="b_L becomes b_L + b_cold (1 - h_0) exp(-t / tau)",
     source="viscosity of oil over temperature (Walther's equation): ASTM D341",
     excited_by="steady driving from cold",
     parameters=(
         EffectParameter("cold_nm_s", "damping", 0.0, 0.0, 60.0, "friction that goes away: b_cold"),
         EffectParameter("time_constant_s", "s", 1.0, 0.02, 10.0, "time constant of warming: tau"),
+        EffectParameter(
+            "warm", "", 0.0, 0.0, 1.0, "share gone at its start: h_0, of each recording", True, True, outlasts=True
+        ),
     ),
     structures=EVERY_LINE,
     resembles=("torque_derating", "road_grade"),

@@ -140,7 +140,7 @@ TORQUE_DERATING = Effect(
     name="torque_derating",
     element=Element.TORQUE_PATH,
     title="derating of the torque",
-    law="T = T_read (1 - d h), h = 1 - exp(-t / tau); by its own heat tau dh/dt + h = (T_read / T_n)^2",
+    law="T = T_read (1 - d h), h = 1 - (1 - h_0) exp(-t / tau); by its own heat tau dh/dt + h = (T_read / T_n)^2",
     source="magnet flux and temperature: Pyrhönen, Jokinen, Hrabovcová, Design of Rotating Electrical Machines, 2014; "
     "heat of a winding: IEC 60255-149",
     excited_by="a long pull at high torque",
@@ -148,6 +148,9 @@ TORQUE_DERATING = Effect(
         EffectParameter("depth", "", 0.0, 0.0, 1.0, "share of the torque that is lost in the end: d", most=1.0),
         EffectParameter("time_constant_s", "s", 1.0, 0.02, 10.0, "time constant of the decay: tau"),
         EffectParameter("heating_nm", "torque", 0.0, 0.0, 10.0, "torque that leads to the loss d: T_n", True),
+        EffectParameter(
+            "warm", "", 0.0, 0.0, 1.0, "share of d at its start: h_0, of each recording", True, True, outlasts=True
+        ),
     ),
     structures=EVERY_LINE,
     resembles=("inverter_gain_mismatch", "road_grade", "warming_friction"),

@@ -183,7 +183,7 @@ def conditions(
         inertia_load,
         1.0 / inertia_load if masses > 1 else 0.0,
         stiffness,
-        p[slots.B_L] + cold_part(time_s, p[slots.WARMING], p[slots.WARMING_TIME]),
+        p[slots.B_L] + cold_part(time_s, p[slots.WARMING] * (1.0 - p[slots.WARMED]), p[slots.WARMING_TIME]),
         dry_motor,
         dry_load,
         max(

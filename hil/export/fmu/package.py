@@ -64,6 +64,7 @@ _OF_THE_PATH = {
     "DEPTH": ("torque_derating", "depth"),
     "DERATING_TIME": ("torque_derating", "time_constant_s"),
     "HEATED": ("torque_derating", "heating_nm"),
+    "WARM": ("torque_derating", "warm"),
 }
 _FROM_STATES = (
     "ANGLE", "SPEED", "TWIST", "LOAD_SPEED", "MIDDLE_TWIST", "MIDDLE_SPEED", "TRACTION", "LAGGED", "LAG_RISE",

@@ -83,10 +83,13 @@ def test_a_payload_changes_the_loads_inertia(change: float, from_s: float, to_s:
     assert_law(effects, solved(line, (from_s, to_s)), tolerance=3e-4)
 
 
-def test_warming_oil_loses_viscous_friction() -> None:
+@pytest.mark.parametrize("since_s", [0.0, 0.5])
+def test_warming_oil_loses_viscous_friction(since_s: float) -> None:
+    """From cold, or for some time already when the recording begins."""
     cold, tau = 25.0, 0.7
-    line = two_mass(drag=lambda t, w: cold * np.exp(-t / tau) * w)
-    assert_law({"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau}}, solved(line))
+    line = two_mass(drag=lambda t, w: cold * np.exp(-(t + since_s) / tau) * w)
+    warm = 1.0 - float(np.exp(-since_s / tau))
+    assert_law({"warming_friction": {"cold_nm_s": cold, "time_constant_s": tau, "warm": warm}}, solved(line))
 
 
 @pytest.mark.parametrize("motor_turns", [1.0, 3.3])

@@ -68,11 +68,13 @@ def test_saturation_cuts_each_inverter_and_then_the_sum(name: str) -> None:
     assert_law({"torque_saturation": limits}, solved(two_mass(), held=held(expected)), measured(torque_nm=BOTH))
 
 
-@pytest.mark.parametrize("depth", [0.3, -0.1])
-def test_derating_lets_the_torque_fall_towards_its_depth(depth: float) -> None:
+@pytest.mark.parametrize(("depth", "since_s"), [(0.3, 0.0), (-0.1, 0.0), (0.3, 1.1)])
+def test_derating_lets_the_torque_fall_towards_its_depth(depth: float, since_s: float) -> None:
+    """From a cold start, or for some time already when the recording begins."""
     tau = 0.8
-    left = 1.0 - depth * (1.0 - np.exp(-TIME_S / tau))
-    effects = {"torque_derating": {"depth": depth, "time_constant_s": tau}}
+    left = 1.0 - depth * (1.0 - np.exp(-(TIME_S + since_s) / tau))
+    warm = 1.0 - float(np.exp(-since_s / tau))
+    effects = {"torque_derating": {"depth": depth, "time_constant_s": tau, "warm": warm}}
     np.testing.assert_allclose(supplied(TORQUE[:, None], **effects), TORQUE * left, rtol=1e-12)
     assert_law(effects, solved(two_mass(), held=held(TORQUE * left)))
 

@@ -14,7 +14,7 @@ from estimator.physics.layout import flat, grid_for, slot
 from estimator.physics.model import Parameter
 from estimator.physics.problem import make_problem
 from estimator.physics.simulate import simulate
-from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns, released
+from estimator.physics.unknowns import effect_unknowns, local_basis, nominal_unknowns, own_of_each, released
 from estimator.signals.record import OutputKind
 from tests.estimator.physics.bench import ONE_MASS, TWO_MASS, linear_record, model, random_steps, record
 
@@ -113,6 +113,19 @@ def test_moments_and_phases_are_every_recordings_own() -> None:
     for order, release in zip(orders, ripples, strict=True):
         assert order.low == order.start == order.high
         assert [[s.name for s in own] for own in release.own] == [["phase_rad", "share_phase_rad"]] * 2
+
+
+@pytest.mark.parametrize("name", ["torque_derating", "warming_friction"])
+def test_what_continues_from_recording_to_recording_is_counted_from_the_first(name: str) -> None:
+    """What the first one began with is part of the line's own values; a further output has that of its recording."""
+    first, second = (linear_record(TWO_MASS, random_steps(300, seed=seed), CRUISE) for seed in (1, 2))
+    also_first = replace(first, lead=first)
+    found = own_of_each([name], [first, second, also_first])
+    assert [[(each.name, each.low, each.start, each.high) for each in own] for own in found] == [
+        [("warm", 0.0, 0.0, 0.0)],
+        [("warm", 0.0, 0.0, 1.0)],
+        [("warm", 0.0, 0.0, 0.0)],
+    ]
 
 
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])

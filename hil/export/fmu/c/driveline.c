@@ -96,7 +96,8 @@ static double summed(Driveline *d) {
 
 static double warmth(const Driveline *d) { /* 1: as warm as they get; heated by the torque's losses it is a state */
     const double *p = d->value + PARAMETER;
-    return p[HEATED] > 0.0 ? d->value[STATE + WARMTH] : -expm1(-d->value[TIME] / p[DERATING_TIME]);
+    double fading = exp(-d->value[TIME] / p[DERATING_TIME]);
+    return (p[HEATED] > 0.0 ? d->value[STATE + WARMTH] : 1.0 - fading) + p[WARM] * fading;
 }
 
 static double on_shaft(Driveline *d) {
