@@ -10,7 +10,7 @@ from typing import Any
 
 from estimator.design.left_open import left_open
 from estimator.design.open import Open, name_of
-from estimator.design.paper import as_model
+from estimator.design.paper import LEAST_PROBABILITY, as_model
 from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.physics.catalogue import title_of
 from estimator.physics.driveline import Load
@@ -32,6 +32,8 @@ from hil.report.diagnosis_files import publish_diagnosis
 STEP = "solve"
 """Name of the step that drives: the first part of its recordings' names."""
 
+
+OTHER_FORM = "what is there has another form than either"
 
 LEAST_MARGIN_RAD_S = 2.0
 """How far a speed may leave its predicted range, at least [rad/s]: what is missing in the model is not predicted."""
@@ -86,7 +88,10 @@ class Solving:
         self.state.because = ""
         if is_needed(known, Aim.DECIDE):
             design = self._designed(known)
-            if design is not None and design.is_worth_driving:
+            if design is not None and not design.shows and self._is_left_open_against_the_promise():
+                names = " and ".join(in_words(each.name) for each in known.candidates)
+                self.state.because = f"two experiments that should have decided between {names} did not: {OTHER_FORM}"
+            elif design is not None and design.is_worth_driving:
                 return design.planned.name, dict(design.planned.table), design
         if not known.named:
             left = {name: table for name, table in self.source.rig().experiments.items() if name not in self._driven}
@@ -98,6 +103,16 @@ class Solving:
                 self.state.because = f"{', '.join(left)} of the rig file ended early"
                 return End.NOTHING_DECIDES
         return End.DECIDED if known.is_decided else End.NOTHING_DECIDES
+
+    def _is_left_open_against_the_promise(self) -> bool:
+        """Tell whether the last two experiments should have decided between what was open, and left it as it was.
+
+        Each explanation takes a part of what a law of another form leaves, in every experiment anew.
+        """
+        last, driven = self.state.odds[-3:], self.state.driven[-2:]
+        promised = [each.promised_probability or 0.0 for each in driven]
+        same = len({frozenset(each.probabilities) for each in last}) == 1
+        return len(last) == 3 and same and len(promised) == 2 and min(promised) >= LEAST_PROBABILITY
 
     @property
     def _driven(self) -> set[str]:

@@ -10,7 +10,7 @@ from typing import Any, cast
 import pytest
 
 from hil.design.solve import Solving
-from hil.design.solve_state import STATE, Driven, End, SolveState
+from hil.design.solve_state import STATE, Driven, End, Odds, SolveState
 from hil.orders.operator import Answer, StepChoice
 from hil.orders.runner import SpeedBandLeft
 from tests.design.test_candidates import SOURCE
@@ -103,3 +103,24 @@ def test_odds_that_contradict_the_verdict_are_no_decision() -> None:
     known = decided_on()
     known.is_decided = False
     assert solving(OWN, [])._next(known) is End.NOTHING_DECIDES
+
+
+@pytest.mark.parametrize(("promised", "ends"), [((0.99, 0.95), True), ((0.99, 0.6), False), ((0.99,), False)])
+def test_what_stays_open_against_the_promise_of_two_experiments_is_driven_no_further(
+    monkeypatch: pytest.MonkeyPatch, promised: tuple[float, ...], ends: bool
+) -> None:
+    """A law of another form leaves each explanation a part of what it is, in every experiment anew."""
+    design = SimpleNamespace(planned=SimpleNamespace(name="a", table={}), shows=(), is_worth_driving=True)
+    monkeypatch.setattr(Solving, "_designed", lambda *_: design)
+    job = solving([], [Path("x.csv")])
+    job.state.driven = [Driven(f"{i}", {}, "x.csv", 40.0, 0.0, 100.0, right) for i, right in enumerate(promised)]
+    odds = {"stribeck_friction": 0.5, "extra_torsional_mode + stribeck_friction": 0.5}
+    job.state.odds = [Odds(count, odds) for count in range(1, len(promised) + 2)]
+    known = decided_on("stribeck_friction")
+    known.is_decided, known.untested = False, ("backlash",)
+    known.candidates = tuple(SimpleNamespace(name=name) for name in odds)
+    found = job._next(known)
+    assert (found is End.NOTHING_DECIDES) is ends
+    assert ("Stribeck friction at the motor did not: what is there has another form" in job.state.because) is ends
+    job.state.odds[-1] = Odds(3, {"stribeck_friction": 0.96, "backlash": 0.04})  # something else is open by now
+    assert job._next(known) is not End.NOTHING_DECIDES

@@ -222,7 +222,7 @@ def test_a_likely_effect_that_the_verdict_does_not_name_is_another_explanation()
 
 
 def test_what_the_verdict_says_could_as_well_be_there_is_not_decided() -> None:
-    """A lag simulates as well as the delay that is there; their likelihoods alone differ, and one more drive decides."""
+    """A lag simulates as well as the delay that is there: likelihoods alone differ, and one more drive decides."""
     bench = bench_with("transport_delay", {"delay_s": 0.004})
     left, diagnosis = left_open(bench.records, bench.model, "quick")
     (named,) = diagnosis.effects
