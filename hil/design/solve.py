@@ -251,4 +251,6 @@ def _lines(known: Open | None, design: Design | None) -> list[DrivelineModel]:
         return []
     supposed = () if design is None else (known.supposed[name] for name in design.shows if name in known.supposed)
     loaded = [as_model(each, known.line) for each in (*known.candidates, *(each.supposed for each in supposed))]
+    if known.unnamed is not None:
+        loaded = [as_model(*known.foremost), *loaded]
     return [*loaded, *(replace(each, load=Load.OWN) for each in loaded)]
