@@ -16,6 +16,7 @@ from estimator.diagnosis.assemble import moved_values
 from estimator.diagnosis.diagnose import SearchResult, answer
 from estimator.diagnosis.first_use import compile_kernels, is_first_use
 from estimator.diagnosis.inference.decide import Judged
+from estimator.diagnosis.inference.disturbances import estimated
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, Effects, Hypothesis, Progress, silent
 from estimator.diagnosis.inference.moves import additions
@@ -24,11 +25,12 @@ from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis, Verdict
 from estimator.diagnosis.table_curves import STRAIGHT
 from estimator.diagnosis.tables import Law
-from estimator.diagnosis.thresholds import Judging
+from estimator.diagnosis.thresholds import Fitting, Judging
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
 from estimator.physics.simulate import MASSES
+from estimator.physics.tables import PLACES
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 
@@ -102,33 +104,38 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
 def _unnamed(law: Law, believed: Hypothesis) -> Unnamed | None:
     """Return a law with the values of its curve as unknowns; None next to a load's free course, or of several outputs.
 
-    What recordings tell only together with the curve is held: what the line does straight on at its place, and the
-    value at one knot, which a constant load may have.
+    What recordings tell only together with the curve is held: what the line does straight on at its place, the named
+    laws of the same part, and the value at one knot, which a constant load may have. Disturbances are estimated anew:
+    without the curve they stand for it.
     """
-    problem, table = law.final.problem, law.found.table
+    result, table = law.found.result, law.found.table
+    problem, part = result.problem, PLACES[table.place].element
     if GRADE in believed.effects or believed.outputs > 1:
         return None
     straight, size = STRAIGHT.get(table.place), float(np.abs(table.values).max())
     line = tuple(
-        replace(each, low=x, high=x) if not each.effect and each.name == straight else each
-        for each, x in zip(problem.shared, law.final.x.tolist(), strict=False)
+        replace(each, low=x, high=x)
+        if (EFFECTS[each.effect].element is part if each.effect else each.name == straight)
+        else each
+        for each, x in zip(problem.shared, result.x.tolist(), strict=False)
     )
     zero = int(np.argmin(np.abs(table.knots)))
     values = {i: value for i, value in enumerate(table.values, start=1) if i - 1 != zero}
     curve = tuple(
         Shared(table.name, f"value_{i}", size, -math.inf, math.inf, value / size) for i, value in values.items()
     )
-    x = np.insert(law.final.x, len(line), [each.start for each in curve])
-    released = replace(law.final, problem=replace(problem, shared=(*line, *curve)), x=x, derivative=None)
-    fit = replace(believed, result=released)
+    x = np.insert(result.x, len(line), [each.start for each in curve])
+    released = replace(result, problem=replace(problem, shared=(*line, *curve)), x=x, derivative=None)
+    sizes, _ = estimated(released, released.residual, believed.sizes, believed.limits, Fitting.ROUNDS)
+    fit = replace(believed, result=released, sizes=sizes)
     return Unnamed(table.place, Candidate(name_of(fit.effects), math.nan, fit, precision_of(fit)), law.line)
 
 
 def _alike(fits: Fits, judged: Judged) -> list[Hypothesis]:
-    """Return the sets with a look-alike in the place of one of the verdict's names."""
+    """Return the sets with a look-alike in the place of one of the verdict's names; none that contains the name."""
     effects = judged.believed.effects
     exchanged = (effects - {each.name} | {other} for each in judged.named for other in each.alike)
-    return [fits.ended[each] for each in exchanged if each in fits.ended]
+    return [fits.ended[each] for each in exchanged if each in fits.ended and not _holds(each, effects)]
 
 
 def _larger(fits: Fits, judged: Judged) -> list[Hypothesis]:

@@ -24,7 +24,7 @@ from estimator.physics.fit import FitResult
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.layout import LOAD, OBSERVER, flat_values, slot
 from estimator.physics.motion import torque_scale
-from estimator.physics.problem import Problem, bounds, case_of, outputs_at, residual_at
+from estimator.physics.problem import Problem, bounds, case_of, outputs_at, own_part, residual_at
 from estimator.physics.table_signals import signal_of
 from estimator.physics.tables import COUNT, DAMPING, PLACES, PREFIX, Table
 from estimator.physics.unknowns import LOAD_TORQUE, Shared
@@ -262,10 +262,11 @@ class Descent:
         self.low, self.high = low, high
 
     def _load(self) -> int:
-        """Return where the constant load of all recordings stands, or that of the first."""
-        known = self.problem.shared[: self.first]
+        """Return where the constant load of all recordings stands, or that of the first one that is fitted."""
+        problem, known = self.problem, self.problem.shared[: self.first]
         common = [i for i, each in enumerate(known) if not each.effect and each.name == LOAD]
-        return common[0] if common else len(self.problem.shared) + LOAD_TORQUE
+        used = next((i for i, use in enumerate(problem.use) if use.any()), 0)
+        return common[0] if common else own_part(problem, used).start + LOAD_TORQUE
 
     @property
     def straight(self) -> list[int]:

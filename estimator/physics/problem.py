@@ -15,7 +15,7 @@ from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.layout import LOAD, Grid, flat, grid_for, slot
 from estimator.physics.model import DrivelineModel, Load
 from estimator.physics.simulate import simulate_outputs, simulate_records
-from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_of_each, shared_load
+from estimator.physics.unknowns import LocalBasis, Shared, local_basis, own_unknowns, shared_load
 from estimator.signals.record import BoolArray, FloatArray, IntArray, Record, leads, once
 
 BAD = 1e3  # a simulation that runs away counts as this many times the largest output
@@ -80,7 +80,7 @@ def make_problem(
     load torque that all recordings share is an unknown next to ``shared``; of one recording it is its own.
     """
     if own is None:
-        own = own_of_each(model.effects, records)
+        own = [own_unknowns(model.effects, record) for record in records]
     if model.load is Load.SHARED and len(records) > 1 and not any(unknown.slot == slot("", LOAD) for unknown in shared):
         shared = (*shared, shared_load(model, records))
     has_own_load = model.load is Load.OWN or (model.load is Load.SHARED and len(records) == 1)

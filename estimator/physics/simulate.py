@@ -358,7 +358,7 @@ class Stepper:
         self._substeps = FINER * substeps_for(model.values(), period_s)
         history = int(np.ceil(self._p[slot(TRANSPORT_DELAY.name, "delay_s")] / period_s)) + 2
         self._steps = 0
-        self._warmth = 0.0
+        self._warmth = float(self._p[slot("torque_derating", "warm")])
         self._torque = np.zeros(history)
         self._load = np.full(history, load_torque_nm)
         self._angle = np.zeros(history)

@@ -121,11 +121,13 @@ def own_of_each(names: Iterable[str], records: Sequence[Record]) -> tuple[tuple[
     """Return the unknowns that effects have in each of some recordings, the first of them the earliest.
 
     What continues from one recording to the next is counted from the first one: what that began with is part of the
-    line's own values.
+    line's own values. So is it in later pieces of the first recording, whose time continues.
     """
     names, found = list(names), []
+    of_first = records[0].name.partition("#")[0]
     for record in records:
-        is_first = record is records[0] or record.lead is records[0]
+        continues = record.since_start_s[0] > 0.0 and record.name.partition("#")[0] == of_first
+        is_first = record is records[0] or record.lead is records[0] or continues
         lasting = {(name, p.name) for name in names for p in EFFECTS[name].own_parameters if p.outlasts and is_first}
         own = own_unknowns(names, record)
         found.append(tuple(replace(u, low=u.start, high=u.start) if (u.effect, u.name) in lasting else u for u in own))

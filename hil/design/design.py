@@ -102,7 +102,7 @@ class Design:
         """Whether it tells enough to take the vehicle out."""
         if self.aim is Aim.DECIDE and self.shows:
             return True
-        if (self.aim is Aim.DECIDE and self.decides is None) or (self.aim is Aim.LAW and not _wide(self.widths)):
+        if (self.aim is Aim.DECIDE and self.decides is None) or (self.aim is Aim.LAW and not wide(self.widths)):
             return False
         return self.factor >= (WORTH if self.decides is not None else 1.0 + WIDE_INTERVAL)
 
@@ -231,11 +231,11 @@ def _record(name: str, period_s: float, prediction: Prediction) -> Record:
 
 def _shortened(values: Sequence[Width]) -> float:
     """Return the mean factor by which the intervals that are wide become shorter; all, where none is."""
-    wide = _wide(values) or list(values)
-    return math.exp(float(np.mean([math.log(max(each.now, 1e-300) / max(each.after, 1e-300)) for each in wide])))
+    found = wide(values) or list(values)
+    return math.exp(float(np.mean([math.log(max(each.now, 1e-300) / max(each.after, 1e-300)) for each in found])))
 
 
-def _wide(values: Sequence[Width]) -> list[Width]:
+def wide(values: Sequence[Width]) -> list[Width]:
     """Return the intervals that are wide; those of a curve against its largest value: one of its values may be 0."""
     of_curve = max((abs(each.value) for each in values if each.name.startswith(PREFIX)), default=0.0)
     sizes = (of_curve if each.name.startswith(PREFIX) else abs(each.value) for each in values)

@@ -15,7 +15,7 @@ from estimator.design.open import Candidate, Open, name_of
 from estimator.design.paper import Width
 from estimator.physics.catalogue import title_of
 from estimator.physics.tables import PLACES
-from hil.design.design import WORTH, Aim, Design, Planned
+from hil.design.design import WORTH, Aim, Design, Planned, wide
 from hil.figures.drawn import drawing, require_matplotlib
 
 SCHEMA = "hil.design/1"
@@ -132,6 +132,8 @@ def obstacle(design: Design) -> str:
     """
     if design.decides is None and design.aim is Aim.DECIDE:
         return "no experiment that this rig may drive shows one of these"
+    if design.aim is Aim.LAW and not wide(design.widths):
+        return "the curve is known to a tenth of its largest torque"
     if design.aim is Aim.LAW:
         return "no experiment that this rig may drive makes the curve's intervals clearly shorter"
     if design.aim is Aim.PARAMETERS:
@@ -157,6 +159,7 @@ def design_document(known: Open, design: Design | None, aim: Aim) -> dict[str, A
         "untested": list(known.untested),
         "conditions": list(conditions(known)),
         "decided": known.is_decided,
+        "law_without_a_name": None if known.unnamed is None else known.unnamed.place,
         "experiment": None,
     }
     if design is None:

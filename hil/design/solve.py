@@ -88,7 +88,8 @@ class Solving:
         self.state.because = ""
         if is_needed(known, Aim.DECIDE):
             design = self._designed(known)
-            if design is not None and not design.shows and self._is_left_open_against_the_promise():
+            decides = design is not None and design.decides is not None and not design.shows
+            if decides and self._is_left_open_against_the_promise():
                 names = " and ".join(in_words(each.name) for each in known.candidates)
                 self.state.because = f"two experiments that should have decided between {names} did not: {OTHER_FORM}"
             elif design is not None and design.is_worth_driving:

@@ -125,7 +125,7 @@ class World:
         planned = SimpleNamespace(name="steps about standstill", table={"kind": "tip"})
         worth = self.factor >= 3.0
         return SimpleNamespace(
-            aim=Aim.DECIDE, planned=planned, decides=expected, factor=self.factor, is_worth_driving=worth
+            aim=Aim.DECIDE, planned=planned, decides=expected, shows=(), factor=self.factor, is_worth_driving=worth
         )
 
     def _publish(self, folder: Path, *_: object) -> None:

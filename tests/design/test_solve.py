@@ -110,7 +110,8 @@ def test_what_stays_open_against_the_promise_of_two_experiments_is_driven_no_fur
     monkeypatch: pytest.MonkeyPatch, promised: tuple[float, ...], ends: bool
 ) -> None:
     """A law of another form leaves each explanation a part of what it is, in every experiment anew."""
-    design = SimpleNamespace(planned=SimpleNamespace(name="a", table={}), shows=(), is_worth_driving=True)
+    planned = SimpleNamespace(name="a", table={})
+    design = SimpleNamespace(planned=planned, shows=(), decides=SimpleNamespace(), is_worth_driving=True)
     monkeypatch.setattr(Solving, "_designed", lambda *_: design)
     job = solving([], [Path("x.csv")])
     job.state.driven = [Driven(f"{i}", {}, "x.csv", 40.0, 0.0, 100.0, right) for i, right in enumerate(promised)]
@@ -122,5 +123,8 @@ def test_what_stays_open_against_the_promise_of_two_experiments_is_driven_no_fur
     found = job._next(known)
     assert (found is End.NOTHING_DECIDES) is ends
     assert ("Stribeck friction at the motor did not: what is there has another form" in job.state.because) is ends
+    design.decides = None  # it is for the law that has no name
+    assert job._next(known) is not End.NOTHING_DECIDES
+    design.decides = SimpleNamespace()
     job.state.odds[-1] = Odds(3, {"stribeck_friction": 0.96, "backlash": 0.04})  # something else is open by now
     assert job._next(known) is not End.NOTHING_DECIDES

@@ -157,13 +157,14 @@ def _judged(search: Search, rival: Rival) -> Judged:
     failed = _failed(nothing.hypothesis)
     if not failed and not search.best.effects:
         return Judged(nothing, nothing, nothing, tried=trials.all)
-    sheet = free_line(fits)
+    sheets = free_lines(fits)
     likely, tried = _candidates(search)
     noise = noise_of(likely.hypothesis)
     chosen = nothing
     while (larger := _needed_beyond(chosen, tried, noise)) is not None:
         chosen = larger
-    if sheet is not None and _is_rather(sheet, fits.model, chosen, noise):
+    sheet = next((each for each in sheets if _is_rather(each, fits.model, chosen, noise)), None)
+    if sheet is not None:
         off_nominal = sheet.off_nominal if sheet.leaves_noise else ()
         return Judged(nothing, likely, nothing, off_nominal=off_nominal, tried=trials.all, failed=failed)
     believed, weak = chosen, dict[str, Standing]()
@@ -336,29 +337,33 @@ class FreeLine:
         return tried(self.hypothesis, model, len(self.off_nominal))
 
 
-def free_line(fits: Fits) -> FreeLine | None:
-    """Fit the nominal line beyond its tolerances; None where these hold nothing back.
+def free_lines(fits: Fits) -> list[FreeLine]:
+    """Fit the nominal line beyond its tolerances, one value or all of them; nothing where these hold nothing back.
 
-    One value alone is off its sheet where that simulates as well as all of them: two frictions show by their sum at
-    a steady speed, and a fit of both spreads over both what is wrong with one.
+    One value alone comes first where that simulates as well as all: two frictions show by their sum at a steady speed,
+    and a fit of both spreads over both what is wrong with one.
     """
     nothing = fits.nothing().result
     shared = nothing.problem.shared
     trusted = {s.name for s in shared if not s.effect and np.isfinite(s.low) and s.low < s.high}
     at_bound = [s.name for s, pinned in zip(shared, nothing.pinned, strict=False) if pinned and s.name in trusted]
     if not at_bound:
-        return None
-    whole = _freed(fits, trusted)
-    each_alone = (_freed(fits, {name}) for name in at_bound)
+        return []
+    whole = _freed(fits, trusted, len(trusted))
+    each_alone = (_freed(fits, {name}, len(trusted)) for name in at_bound)
     alone = min((each for each in each_alone if each is not None), key=lambda each: each.score, default=None)
     if whole is None or alone is None:
-        return whole or alone
+        return [each for each in (alone, whole) if each is not None]
     as_good = alone.leaves_noise or not whole.leaves_noise
-    return alone if as_good and not whole.tried(fits.model).clearly_beats(alone.tried(fits.model)) else whole
+    is_enough = as_good and not whole.tried(fits.model).clearly_beats(alone.tried(fits.model))
+    return [alone, whole] if is_enough else [whole]
 
 
-def _freed(fits: Fits, names: Collection[str]) -> FreeLine | None:
-    """Fit the nominal line with some of its values free; None where none of these clearly leaves its tolerance."""
+def _freed(fits: Fits, names: Collection[str], among: int) -> FreeLine | None:
+    """Fit the nominal line with some of its values free; None where none of these clearly leaves its tolerance.
+
+    They were chosen ``among`` so many.
+    """
     nothing = fits.nothing().result
     shared = nothing.problem.shared
     # a joint has nothing to integrate: of its stiffness and damping, one may be none at all
@@ -374,7 +379,7 @@ def _freed(fits: Fits, names: Collection[str]) -> FreeLine | None:
     off_nominal = _off_nominal(fits, found, names)
     if not off_nominal:
         return None
-    chosen = Catalogue(fits.model, len(fits.names) + len(shared)).choices(frozenset(each.name for each in off_nominal))
+    chosen = Catalogue(fits.model, len(fits.names) + among).choices(frozenset(each.name for each in off_nominal))
     return FreeLine(found, found.score + 2.0 * chosen, not any(test.failed for test in tests(found)), off_nominal)
 
 
@@ -392,7 +397,8 @@ def _off_nominal(fits: Fits, found: Hypothesis, freed: Collection[str]) -> tuple
         ratio = float(found.result.x[i])
         by = max(trusted.low - ratio, ratio - trusted.high)
         sureness = gained if len(freed) == 1 else by / float(spread[i])
-        if not trusted.effect and trusted.low < trusted.high and by > 0.0 and sureness > Judging.CLEARLY:
+        is_free = trusted.name in freed and not trusted.effect and trusted.low < trusted.high
+        if is_free and by > 0.0 and sureness > Judging.CLEARLY:
             given, unit = fits.model.parameters[trusted.name], parameter_unit(trusted.name, fits.model.motion)
             clear.append((sureness, OffNominal(trusted.name, ratio, trusted.high - 1.0, given.value, unit)))
     return tuple(value for _, value in sorted(clear, key=lambda each: -each[0]))

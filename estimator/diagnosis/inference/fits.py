@@ -28,7 +28,7 @@ from estimator.physics.layout import Grid, grid_for
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
 from estimator.physics.problem import Problem, make_problem, start_vector
-from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_of_each, released
+from estimator.physics.unknowns import Release, Shared, nominal_unknowns, own_unknowns, released
 from estimator.signals.record import BoolArray, Record
 
 ROOM_BYTES = 2**27  # room that answers may take
@@ -137,7 +137,7 @@ class Fits:
     def nothing(self) -> Hypothesis:
         """Return the fit of the nominal line alone."""
         if NOTHING not in self.ended:
-            own = own_of_each(self.model.effects, self.records)
+            own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
             initial = not_fitted(problem, start_vector(problem))
             found = fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue)

@@ -19,7 +19,6 @@ from estimator.physics.layout import LOAD, SIZE, Grid, flat, slot, substeps_for
 from estimator.physics.model import DrivelineModel, Motion, Structure, parameter_unit, unit
 from estimator.physics.problem import case_of, local_part, make_problem
 from estimator.physics.simulate import MASSES, SIGN_WIDTH_RAD_S
-from estimator.physics.unknowns import own_unknowns
 from estimator.signals.record import FloatArray, Location, Record
 from hil.errors import UsageError
 
@@ -121,8 +120,7 @@ def begun(d: Driveline, model: DrivelineModel, record: Record) -> tuple[Drivelin
     model = without_acquisition_effects(
         replace(model, effects={each: v for each, v in model.effects.items() if each != "clock_drift"})
     )
-    own, is_profile = own_unknowns(model.effects, record), any(EFFECTS[each].profile for each in model.effects)
-    problem = make_problem(model, [record], (), own=[own], profile=is_profile)
+    problem = make_problem(model, [record], (), profile=any(EFFECTS[each].profile for each in model.effects))
     result = settle(problem)
     case = case_of(result.problem.local[0], result.problem.p, local_part(result.problem, result.x, 0))
     case.p[_QUANTISATION] = d.p[_QUANTISATION]  # left out of fits, but the sensor's own

@@ -119,13 +119,13 @@ def test_moments_and_phases_are_every_recordings_own() -> None:
 def test_what_continues_from_recording_to_recording_is_counted_from_the_first(name: str) -> None:
     """What the first one began with is part of the line's own values; a further output has that of its recording."""
     first, second = (linear_record(TWO_MASS, random_steps(300, seed=seed), CRUISE) for seed in (1, 2))
+    first, second = replace(first, name="run_1"), replace(second, name="run_2")
     also_first = replace(first, lead=first)
-    found = own_of_each([name], [first, second, also_first])
-    assert [[(each.name, each.low, each.start, each.high) for each in own] for own in found] == [
-        [("warm", 0.0, 0.0, 0.0)],
-        [("warm", 0.0, 0.0, 1.0)],
-        [("warm", 0.0, 0.0, 0.0)],
-    ]
+    continued = replace(first, name="run_1#2", began_s=-8.0)
+    found = own_of_each([name], [first, second, also_first, continued])
+    bounds = [[(each.name, each.low, each.start, each.high) for each in own] for own in found]
+    held = [("warm", 0.0, 0.0, 0.0)]
+    assert bounds == [held, [("warm", 0.0, 0.0, 1.0)], held, held]
 
 
 @pytest.mark.parametrize("kind", [OutputKind.SPEED, OutputKind.POSITION])

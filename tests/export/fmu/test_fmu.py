@@ -56,6 +56,10 @@ CASES: dict[str, Effects] = {
         "actuator_lag": {"time_constant_s": 0.004, "shape": 0.4, "before_nm": -5.0},
         "torque_derating": {"depth": 0.3, "time_constant_s": 2.0, "heating_nm": 80.0, "warm": 0.4},
     },
+    "warm when it starts": {
+        "torque_derating": {"depth": 0.3, "time_constant_s": 2.0, "warm": 0.4},
+        "warming_friction": {"cold_nm_s": 25.0, "time_constant_s": 0.7, "warm": 0.3},
+    },
     "a mode before the shaft": {
         "extra_torsional_mode": {"frequency_hz": 1.0, "between_kg_m2": 0.2, "line_share": 0.8, "damping_ratio": 0.05}
     },

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import pytest
 
 from estimator.diagnosis.diagnose import diagnose
-from estimator.diagnosis.inference.decide import free_line
+from estimator.diagnosis.inference.decide import free_lines
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import all_good_samples, open_hypotheses
 from estimator.diagnosis.result import Effort, Fit, OffNominal, Verdict
@@ -35,8 +35,7 @@ def searched(factors: Mapping[str, float], tolerance: float = 0.1) -> Fits:
 )
 def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, factor: float, element: Element) -> None:
     search = searched({name: factor})
-    line = free_line(search)
-    assert line is not None
+    line = free_lines(search)[0]
     (value,) = line.off_nominal
     assert (value.name, value.element, value.tolerance) == (name, element, pytest.approx(0.1))
     assert value.ratio == pytest.approx(factor, rel=0.03)
@@ -46,8 +45,7 @@ def test_what_left_its_tolerance_is_given_with_its_size_and_place(name: str, fac
 
 def test_one_of_two_frictions_that_recordings_tell_by_their_sum_is_off_alone() -> None:
     """Freed together neither clearly leaves its tolerance, and a law of friction would be named for either."""
-    line = free_line(searched({"b_M": 2.8}))
-    assert line is not None
+    line = free_lines(searched({"b_M": 2.8}))[0]
     (value,) = line.off_nominal
     assert value.name == "b_M"
     known_to = 0.1 * TWO_MASS["b_L"] / (TWO_MASS["b_M"] / 2.8)  # the other one may have what is within its tolerance
@@ -56,7 +54,7 @@ def test_one_of_two_frictions_that_recordings_tell_by_their_sum_is_off_alone() -
 
 
 def test_inside_its_tolerances_nothing_is_beyond() -> None:
-    assert free_line(searched({"k": 1.08})) is None
+    assert free_lines(searched({"k": 1.08})) == []
 
 
 @pytest.mark.parametrize(("k", "is_torque"), [(0.47, True), (1.3, False)])
