@@ -425,7 +425,7 @@ class Diagnosis:
     rejected: tuple[RejectedEffect, ...]  # rivals
     untestable: tuple[UntestableEffect, ...]  # neither shown nor excluded
     fit: Fit  # errors before and after
-    parameters: Mapping[str, Retuned]  # nominal ones, by name
+    parameters: Mapping[str, Retuned]  # nominal ones, by name, as they are without a law that has no name
     load_torque: Mapping[str, Estimated]  # constant one, by recording
     timing_s: Mapping[str, float]  # duration of each step [s]
     augmented: DrivelineModel  # the model with what was found

@@ -494,7 +494,8 @@ def _parameters(diagnosis: Diagnosis) -> html.HtmlTable:
     for name, load in diagnosis.load_torque.items():
         cells = (f"constant load in {name}", "–", shown(load.value), shown_interval(load.ci95), "–", load.unit, "")
         rows.append(_determined(load.ci95, *cells))
-    headings = ("parameter", "nominal", "found", "95 % interval", "change", "unit", "")
+    found = "found" if diagnosis.table is None else "found, without the law"  # next to it the model has others
+    headings = ("parameter", "nominal", found, "95 % interval", "change", "unit", "")
     return html.table(headings, rows, numbers=(1, 2, 3, 4))
 
 
