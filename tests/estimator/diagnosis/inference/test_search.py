@@ -10,9 +10,13 @@ import pytest
 
 from estimator.diagnosis.inference.decide import Decision
 from estimator.diagnosis.inference.hypotheses import GRADE
+from estimator.physics.driveline import InitialCondition
+from estimator.physics.layout import flat_values, grid_for
 from estimator.physics.model import EffectValue
+from estimator.physics.simulate import simulate
 from tests.estimator.diagnosis.one_effect import Bench, bench_with, decided, searched
-from tests.estimator.diagnosis.planted import SIGMA
+from tests.estimator.diagnosis.planted import SAMPLES, SIGMA, drive_torque
+from tests.estimator.physics.bench import TWO_MASS, model, record
 
 PLAIN = ("quadratic_friction", {"quadratic_nm_s2": 1e-9})
 """An effect so small that it is none."""
@@ -65,6 +69,28 @@ def test_a_shaft_that_is_softer_for_a_while_is_no_generator_that_is_coupled() ->
     assert "generator_coupled" not in judged.named[0].alike
     result = judged.believed.hypothesis.result
     assert result.value("stiffness_change", "change") == pytest.approx(-0.27, abs=0.02)
+
+
+def test_a_torque_that_fades_from_one_recording_to_the_next_is_one_effect() -> None:
+    """It is lost as time passes, in and between recordings of which the first began cold; the line gets the rest."""
+    depth, tau_s, began_s = 0.12, 8.0, (0.0, 15.0, 60.0)
+    line, recordings = model(TWO_MASS, 0.2), []
+    for seed, since_s in enumerate(began_s):
+        read = record(drive_torque(seed), np.zeros(SAMPLES), name=f"run_{seed}")
+        left = 1.0 - depth * (1.0 - np.exp(-(since_s + read.time_s - read.time_s[0]) / tau_s))
+        real = replace(read, torque_nm=read.torque_nm * left[:, np.newaxis])
+        output = simulate(grid_for(line, [real]), real, flat_values(TWO_MASS, {}), InitialCondition(5.0, 0.0, 2.0))
+        noise = SIGMA * np.random.default_rng(seed).standard_normal(SAMPLES)
+        recordings.append(replace(read, output=output + noise))
+    names = ["torque_derating", "torque_nonlinearity", "inertia_change", "warming_friction"]
+    judged = decided(searched(Bench(line, recordings), names)).judged
+    assert [each.name for each in judged.named] == ["torque_derating"]
+    assert not judged.failed
+    result = judged.believed.hypothesis.result
+    assert result.value("torque_derating", "depth") == pytest.approx(depth, rel=0.05)
+    assert result.value("torque_derating", "time_constant_s") == pytest.approx(tau_s, rel=0.1)
+    warm = [result.local_of(i)[result.problem.local[i].own_rows][0] for i in range(3)]
+    np.testing.assert_allclose(warm, 1.0 - np.exp(-np.array(began_s) / tau_s), atol=0.03)
 
 
 def test_every_set_is_fitted_once() -> None:
