@@ -23,14 +23,13 @@ from estimator.diagnosis.inference.moves import additions
 from estimator.diagnosis.inference.trials import necessity
 from estimator.diagnosis.preconditions.prepare import prepare
 from estimator.diagnosis.result import Diagnosis, Verdict
-from estimator.diagnosis.table_curves import STRAIGHT
+from estimator.diagnosis.table_curves import alike
 from estimator.diagnosis.tables import Law
 from estimator.diagnosis.thresholds import Fitting, Judging
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.model import DrivelineModel
 from estimator.physics.parallel import Work
 from estimator.physics.simulate import MASSES
-from estimator.physics.tables import PLACES
 from estimator.physics.unknowns import Shared
 from estimator.signals.record import Record
 
@@ -68,11 +67,11 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         and not _holds(each.effects, best.effects)
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
     }
-    alike = _alike(search.fits, judged)
-    near |= {each.effects: each for each in (*_larger(search.fits, judged), *alike, best)}
+    as_good = _as_good(search.fits, judged)
+    near |= {each.effects: each for each in (*_larger(search.fits, judged), *as_good, best)}
     lowest = min(each.score for each in near.values())
     behind = {effects: each.score - lowest for effects, each in near.items()} | dict.fromkeys(
-        (best.effects, *(each.effects for each in alike)), 0.0
+        (best.effects, *(each.effects for each in as_good)), 0.0
     )
     within = max(Judging.ALIKE_WITHIN, 2.0 * TEMPERED * math.log(1.0 / (1.0 - LEAST_PROBABILITY)))
     ordered: list[Hypothesis] = []
@@ -109,15 +108,13 @@ def _unnamed(law: Law, believed: Hypothesis) -> Unnamed | None:
     without the curve they stand for it.
     """
     result, table = law.found.result, law.found.table
-    problem, part = result.problem, PLACES[table.place].element
+    problem = result.problem
     if GRADE in believed.effects or believed.outputs > 1:
         return None
-    straight, size = STRAIGHT.get(table.place), float(np.abs(table.values).max())
+    size, held = float(np.abs(table.values).max()), alike(problem.shared, table.place)
     line = tuple(
-        replace(each, low=x, high=x)
-        if (EFFECTS[each.effect].element is part if each.effect else each.name == straight)
-        else each
-        for each, x in zip(problem.shared, result.x.tolist(), strict=False)
+        replace(each, low=float(result.x[i]), high=float(result.x[i])) if i in held else each
+        for i, each in enumerate(problem.shared)
     )
     zero = int(np.argmin(np.abs(table.knots)))
     values = {i: value for i, value in enumerate(table.values, start=1) if i - 1 != zero}
@@ -131,7 +128,7 @@ def _unnamed(law: Law, believed: Hypothesis) -> Unnamed | None:
     return Unnamed(table.place, Candidate(name_of(fit.effects), math.nan, fit, precision_of(fit)), law.line)
 
 
-def _alike(fits: Fits, judged: Judged) -> list[Hypothesis]:
+def _as_good(fits: Fits, judged: Judged) -> list[Hypothesis]:
     """Return the sets with a look-alike in the place of one of the verdict's names; none that contains the name."""
     effects = judged.believed.effects
     exchanged = (effects - {each.name} | {other} for each in judged.named for other in each.alike)

@@ -51,9 +51,9 @@ def _unseen(known: Open) -> Iterator[Untested]:
     taken = _directions(first)
     tried = frozenset().union(*(each.effects for each in known.candidates))
     for name in open_hypotheses(known.line, known.records)[0]:
-        start = (
-            None if name in tried or EFFECTS[name].event else _start_of(known, name)
-        )  # an event may come at any time
+        if name in tried or EFFECTS[name].event:  # an event may come at any time
+            continue
+        start = _start_of(known, name)
         if start is None:
             continue
         change = first.filter(start.residual - first.result.residual)

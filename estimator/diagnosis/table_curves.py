@@ -43,7 +43,6 @@ YIELDING, SLIDER = "shaft_yielding", "shaft_hysteresis"
 
 LEVEL, SUDDEN = 0.7, 10.0  # where its level starts, in the torque in use, and its knee
 
-
 Z95 = 1.96  # half of a 95 % interval, in standard deviations
 
 GAINS = (0.3, 0.1, 0.03, 0.01, 0.0)
@@ -58,6 +57,19 @@ as so many thousandths of the squared error before."""
 
 Masks = tuple[BoolArray, ...]
 """Which samples count, per recording."""
+
+
+def alike(shared: Sequence[Shared], place: str) -> list[int]:
+    """Return where the unknowns stand, among some, that recordings tell only together with a curve at a place.
+
+    They are the line's parameter that a straight curve does the same as, and the values of named laws of the same part.
+    """
+    part, straight = PLACES[place].element, STRAIGHT.get(place)
+    return [
+        i
+        for i, each in enumerate(shared)
+        if (EFFECTS[each.effect].element is part if each.effect else each.name == straight)
+    ]
 
 
 @dataclass(frozen=True)
@@ -101,7 +113,7 @@ class Curve:
         return [i for i in range(self.knots.size) if self.place in LEVELLED or i != self.zero]
 
     @property
-    def straight(self) -> FloatArray:
+    def null(self) -> FloatArray:
         """Unknowns, shape (U,), of a curve that does nothing: its own slopes, and a level of 0 where it has one."""
         return np.append(np.full(self.pieces, self.own), np.zeros(len(self.free) - self.pieces))
 
@@ -116,7 +128,7 @@ class Curve:
     def values(self, unknowns: FloatArray) -> FloatArray:
         """Return the values at all knots, shape (K,) [Nm], of slopes and the level, shape (U,)."""
         found = np.zeros(self.knots.size)
-        found[self.free] = self.of_unknowns @ (unknowns - self.straight)
+        found[self.free] = self.of_unknowns @ (unknowns - self.null)
         return found
 
     def drawn_in(self, signal: FloatArray) -> Curve:
@@ -136,7 +148,7 @@ class Curve:
         there = values_at(table, self.knots)
         slopes = np.diff(there) / (self.base * np.diff(self.knots))
         level = there[self.zero] / (self.base * np.abs(self.knots).max())
-        return self.straight + np.append(slopes, level)[: len(self.free)]
+        return self.null + np.append(slopes, level)[: len(self.free)]
 
     def released(self, result: FitResult, use: Masks) -> Problem:
         """Return the problem of a fit with the curve's values next to its own unknowns."""
@@ -257,7 +269,9 @@ class Descent:
         low, high = bounds(self.problem)
         slopes = slice(self.first, self.first + curve.pieces)
         low[slopes], high[slopes] = curve.most
-        held = [*self.straight, self._load()] if curve.place in LEVELLED else []
+        known = self.problem.shared[: self.first]
+        straight = [i for i in alike(known, curve.place) if not known[i].effect]
+        held = [*straight, self._load()] if curve.place in LEVELLED else []
         low[held] = high[held] = self.start(np.empty(0))[held]
         self.low, self.high = low, high
 
@@ -268,21 +282,9 @@ class Descent:
         used = next((i for i, use in enumerate(problem.use) if use.any()), 0)
         return common[0] if common else own_part(problem, used).start + LOAD_TORQUE
 
-    @property
-    def straight(self) -> list[int]:
-        """Where the line's parameter stands that a straight curve does the same as; nothing where there is none."""
-        known, name = self.problem.shared[: self.first], STRAIGHT.get(self.curve.place)
-        return [i for i, each in enumerate(known) if not each.effect and each.name == name]
-
-    @property
-    def named(self) -> list[int]:
-        """Where the values of named laws of the same part stand."""
-        known, part = self.problem.shared[: self.first], PLACES[self.curve.place].element
-        return [i for i, each in enumerate(known) if each.effect and EFFECTS[each.effect].element is part]
-
     def start(self, slopes: FloatArray) -> FloatArray:
         """Return unknowns with these slopes, all else as the line had it."""
-        own, of_curve = [each.start for each in self.curve.more], self.curve.straight
+        own, of_curve = [each.start for each in self.curve.more], self.curve.null
         of_curve[: slopes.size] = slopes
         return np.concatenate([self._x0[: self.first], of_curve, own, self._x0[self.first :]])
 
@@ -315,9 +317,7 @@ class Descent:
             return seen[key]
 
         def residual(z: FloatArray) -> FloatArray:
-            bent = penalty @ (
-                z[of_curve] - self.curve.straight
-            )  # other unknowns may be infinite, as a limit of none is
+            bent = penalty @ (z[of_curve] - self.curve.null)  # other unknowns may be infinite, as a limit of none is
             return np.concatenate([residual_at(problem, outputs(z)) / self._scale, bent])
 
         def jacobian(z: FloatArray) -> FloatArray:

@@ -32,6 +32,7 @@ from estimator.diagnosis.table_curves import (
     Curve,
     Descent,
     Masks,
+    alike,
     best_curve,
     curve_at,
     rms_over,
@@ -180,10 +181,10 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
     rivals = [PLACES[place].over for place in alike_places if place != best.descent.curve.place]
     not_carried = [name for name, (without, with_law) in zip(firsts, kept, strict=False) if with_law > without]
     table, place, at = widened_by_jackknife(table, torques), table.place, PLACES[table.place]
-    alike, formula = looks_like(table, slope), shortest_formula(table, slope)
+    likeness, formula = looks_like(table, slope), shortest_formula(table, slope)
     if curve.yields:
         of = unit("torque", line.motion)
-        alike = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
+        likeness = f"a clutch that slips at {result.p[AT_SLIDER]:.3g} {of}, by {SLIDER} next to the curve"
         formula = ""
     law = UnnamedTable(
         place=place,
@@ -198,7 +199,7 @@ def best_table(hypothesis: Hypothesis, line: DrivelineModel, holdout: Sequence[R
         reached=(float(where.min()), float(where.max())),
         rms_before=before,
         rms_after=after,
-        looks_like=alike,
+        looks_like=likeness,
         formula=formula,
         rival=next(iter(rivals), ""),
         not_carried=tuple(not_carried),
@@ -241,7 +242,7 @@ def _half_widths(
 ) -> FloatArray:
     """Return half of the 95 % intervals of the values [Nm]: of errors that are worth fewer than they are."""
     derivative = jacobian_at(problem, x, outputs)
-    derivative[:, [*descent.straight, *descent.named]] = 0.0  # recordings tell the sum of them and the curve
+    derivative[:, alike(problem.shared[: descent.first], descent.curve.place)] = 0.0  # recordings know the sum
     free = np.flatnonzero(derivative.any(axis=0) & (descent.low < descent.high))
     j = derivative[:, free]
     variance = float(residual @ residual) / effective_samples([residual])

@@ -113,7 +113,8 @@ def designed(
     """Choose the next experiment for a rig; none of those left out, by name and why.
 
     To decide, it is one that decides between explanations, where any does; of these the one that shows most of what no
-    recording so far could. Where none decides, or nothing is to be decided between, it is the one that shows most.
+    recording so far could. Where none decides, or nothing is to be decided between, it is the one that shows most;
+    where nothing shows either and a law without a name is left, the one that makes its curve known best.
     """
     rig = source.rig()
     limits = Limits.of(rig)
