@@ -1,8 +1,8 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at a `Place` is taken into the one kernel from its entry; one that
-changes the line itself is written into the kernel. Everything else about it stands in its entry.
+that acts at a `Place` is taken into the one kernel from its entry. Written into the kernel is only what gives the line
+another mass, has faces that meet, or comes between the samples. Everything else about it stands in its entry.
 """
 
 from __future__ import annotations
@@ -28,16 +28,29 @@ WITH_SPRING = WITH_SHAFT | {Structure.JOINT}  # structures with a shaft, between
 class Place(Enum):
     """Where a law acts, and so what it is given before its parameters, and what it returns.
 
-    Those of a speed or an angle are compiled: for one simulation and for several side by side (``estimator.lanes``).
+    All but those of the recorded torque are compiled: for one simulation and for several side by side
+    (``estimator.lanes``). Where several laws act at one place their torques add up; a law that is given a value of the
+    line, a twist or a reading returns what it makes of it, and the next one takes that.
     """
 
-    TORQUE = "torque"
-    MOTOR = "motor"
-    LOAD = "load"
-    LOAD_ANGLE = "load_angle"
-    RECORDED_ANGLE = "recorded_angle"
-    SHAFT = "shaft"
-    SHAFT_LOSS = "shaft_loss"
+    TORQUE = "torque"  # recorded torque, time since the start, (N,) each -> torque that acts
+    DRIVE_ANGLE = "drive_angle"  # angle of the motor -> torque at the motor, share of the drive's own torque
+    MOTOR = "motor"  # speed -> torque against the motion
+    MOTOR_DRY = "motor_dry"  # speed -> size of a dry friction that slides
+    MOTOR_INERTIA = "motor_inertia"  # inertia, time since the start, length of the step -> inertia
+    JOINT = "joint"  # angle of the motor -> torque, share of the shaft's own, angle, rate of the angle over the motor's
+    STIFFNESS = "stiffness"  # stiffness of the shaft, time since the start, length of the step -> stiffness
+    SPRING = "spring"  # twist of the shaft -> twist at which a linear spring carries the same torque
+    SHAFT = "shaft"  # twist, its rate -> torque; its laws have a state
+    SHAFT_LOSS = "shaft_loss"  # torque of the shaft, direction of the motion -> torque that is lost
+    LOAD = "load"  # speed -> torque against the motion
+    LOAD_DRY = "load_dry"  # time since the start, length of the step -> size of a dry friction
+    LOAD_DAMPING = "load_damping"  # viscous friction, time since the start, length of the step -> viscous friction
+    LOAD_INERTIA = "load_inertia"  # inertia, time since the start, length of the step -> inertia
+    LOAD_ANGLE = "load_angle"  # angle of the load -> torque against it
+    RECORDED_ANGLE = "recorded_angle"  # angle of the motor as it was recorded -> torque against the load
+    RESOLVER = "resolver"  # speed, angle that is read -> speed that is read
+    SENSOR = "sensor"  # reading -> what is recorded of it
 
 
 class Around(NamedTuple):
@@ -205,6 +218,7 @@ class Effect:
     permanent: str = ""  # the effect that the event is where it acts all along, if that is one
     phases: Mapping[str, str] = field(default_factory=dict)
     """Of a periodic law: parameter that is a phase, and the one that is its amplitude."""
+    either: tuple[str, ...] = ()  # sizes, where its first parameter is not the only one that does something by itself
     widens: frozenset[str] = frozenset()  # nominal parameters that it moves beyond what they are trusted to
     described: Spans = lambda _model, _values, _line: {}
     """A nominal parameter's values with the effect: one span, or one before and one after."""
@@ -227,6 +241,11 @@ class Effect:
     """True where it ties the load to a place, as gravity does: makes no sense where the load turns round and round."""
     shows_start: frozenset[str] = frozenset()  # what else of a joint's start matters with it
     recognised: bool = False  # true where it is read off the samples (repeated, lost, rounded, late) and not fitted
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """The parameters of which each does something by itself: the first, the amplitudes, or what is said."""
+        return self.either or tuple(self.phases.values()) or (self.parameters[0].name,)
 
     @property
     def lasting(self) -> bool:

@@ -15,8 +15,9 @@ from estimator.physics.curve import MOST_KNOTS, VALUES, curve_over
 from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.effect import Place
 from estimator.physics.effects.torque import EDGE
-from estimator.physics.kernel import conditions, sensing, slots, state_vector
+from estimator.physics.kernel import conditions, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
+from estimator.physics.kernel.laws_at import load_sliding, motor_sliding, resolved
 from estimator.physics.layout import LOAD, slot
 from estimator.signals.record import MOST_BYTES, FloatArray, IntArray, Record, once
 
@@ -41,6 +42,8 @@ _WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _D
 _TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
 _PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places), *_TABLE])
 """Where all stands that ``shaft_torque`` depends on."""
+
+MOMENT_S = 1e-9  # how long a start takes: shorter than any period
 
 MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
 
@@ -244,9 +247,9 @@ def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> 
         )
     x[state_vector.LAGGED] = torque_nm + p[slots.LAGGED_BEFORE]
     x[state_vector.LAG_RISE] = -p[slots.LAGGED_BEFORE]
-    x[state_vector.FILTERED] = sensing.reading(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
+    x[state_vector.FILTERED] = resolved(speed, angle_rad, p) + p[slots.FILTERED_BEFORE]
     x[state_vector.FILTER_RISE] = -p[slots.FILTERED_BEFORE]
     if is_bristled(p):  # of friction that has slid for long
-        x[state_vector.BRISTLES_MOTOR] = conditions.slid(speed, conditions.sliding(speed, p))
+        x[state_vector.BRISTLES_MOTOR] = conditions.slid(speed, motor_sliding(speed, p))
         loaded = carried if p[slots.J_L] > 0.0 else speed
-        x[state_vector.BRISTLES_LOAD] = conditions.slid(loaded, p[slots.COULOMB_LOAD])
+        x[state_vector.BRISTLES_LOAD] = conditions.slid(loaded, load_sliding(0.0, MOMENT_S, p))

@@ -12,9 +12,10 @@ from estimator.compiled import compiled
 from estimator.identification.modes.modes import Mode
 from estimator.physics.curve import curve
 from estimator.physics.effect import Around
-from estimator.physics.effects.shaft import SHAFT_HYSTERESIS, damping_share, loaded_twist, slider_law, slider_rate
+from estimator.physics.effects.shaft import SHAFT_HYSTERESIS, damping_share, slider_law, slider_rate
 from estimator.physics.kernel import slots, state_vector
-from estimator.physics.laws import beyond_gap, share_inside
+from estimator.physics.kernel.laws_at import shaft_stiffness, spring_twist
+from estimator.physics.laws import beyond_gap
 from estimator.physics.layout import slot
 from estimator.physics.model import DrivelineModel, Motion, Structure
 from estimator.physics.motion import measured_speed
@@ -186,8 +187,7 @@ def respond(
     """Fill ``out`` with the torque under an imposed twist [rad] and its rate [rad/s]; all of shape (N,)."""
     inside, loading = beyond_gap(twist[0], p[slots.GAP]), 0.0
     for k in range(twist.shape[0]):
-        broken = share_inside(time_s[k], period_s, p[slots.CRACK_FROM], p[slots.CRACK_TO])
-        stiffness = p[slots.K] * (1.0 + broken * p[slots.CRACK])
+        stiffness = shaft_stiffness(p[slots.K], time_s[k], period_s, p)
         before = inside
         inside = behind_gap(twist[k], before, loading, stiffness, preload, p)
         loading = slid(loading, inside - before, p)
@@ -269,6 +269,5 @@ def carried(inside: float, loading: float, stiffness: float, preload: float, p: 
     """Return the torque of spring and slider, less the preload [Nm]."""
     if p[slots.TABLE_TWIST] > 0.0:
         preload = preload - curve(inside, p, slots.TABLE_TWIST, False)[0]
-    law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
     held = slider_law(inside, 0.0, loading, Around(stiffness, math.inf, math.inf), *slider(p))
-    return stiffness * loaded_twist(inside, *law) + held - preload
+    return stiffness * spring_twist(inside, p) + held - preload

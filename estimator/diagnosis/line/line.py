@@ -9,8 +9,10 @@ from enum import IntEnum
 import numpy as np
 from scipy.linalg import expm
 
+from estimator.compiled import compiled
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import slots, state_vector
+from estimator.physics.kernel.laws_at import load_rubs, load_sliding, motor_rubs, motor_sliding
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
@@ -21,9 +23,7 @@ from estimator.signals.record import FloatArray, Location, OutputKind, Record, b
 AROUND = 2  # samples before and behind a moment between which a law's change counts
 LASTS = 3.0  # samples over which such an error is correlated: about as long as a change counts
 
-_MOTOR = (slots.COULOMB, slots.STRIBECK, slots.STRIBECK_COULOMB)
-_LOAD = (slots.COULOMB_LOAD, slots.BRAKE)
-_SHAFT = (slots.GAP, slots.STAGE)
+_STAGE, _STAGE_FROM = (slot("stiffness_nonlinearity", name) for name in ("stage_share", "stage_rad"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,34 +181,40 @@ def _of_laws(result: FitResult, index: int, change_of: Callable[[FloatArray], Fl
     structure = result.problem.grid.structure
     if structure is Structure.JOINT or result.problem.grid.plant is not None:
         return found
-    if p[list(_MOTOR)].any():
+    if motor_rubs(p):
         found[FormPlace.MOTOR] = change_of(_at_motor(simulated(result, index, state=state_vector.SPEED), p))
-    if p[list(_LOAD)].any():
+    if load_rubs(p):
         state = state_vector.SPEED if structure is Structure.ONE_MASS else state_vector.LOAD_SPEED
-        found[FormPlace.LOAD] = change_of(_at_load(simulated(result, index, state=state), record.since_start_s, p))
-    if p[list(_SHAFT)].any():
+        found[FormPlace.LOAD] = change_of(
+            _at_load(simulated(result, index, state=state), record.since_start_s, record.sample_time_s, p)
+        )
+    if p[[slots.GAP, _STAGE]].any():
         found[FormPlace.SHAFT] = change_of(_in_shaft(simulated(result, index, state=state_vector.TWIST), p))
     return np.where(np.isfinite(found), found, 0.0)
 
 
+@compiled
 def _at_motor(speed: FloatArray, p: FloatArray) -> FloatArray:
-    size = p[slots.COULOMB] + np.zeros(speed.size)
-    if p[slots.STRIBECK_SPEED] > 0.0:
-        size += p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * np.exp(-((speed / p[slots.STRIBECK_SPEED]) ** 2))
-    return size * np.sign(speed)
+    torque = np.empty_like(speed)
+    for k in range(speed.size):
+        torque[k] = motor_sliding(speed[k], p) * np.sign(speed[k])
+    return torque
 
 
-def _at_load(speed: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
-    braked = (p[slots.BRAKE_FROM] <= since_start_s) & (since_start_s <= p[slots.BRAKE_TO])
-    return (p[slots.COULOMB_LOAD] + p[slots.BRAKE] * braked) * np.sign(speed)
+@compiled
+def _at_load(speed: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray) -> FloatArray:
+    torque = np.empty_like(speed)
+    for k in range(speed.size):
+        torque[k] = load_sliding(since_start_s[k], period_s, p) * np.sign(speed[k])
+    return torque
 
 
 def _in_shaft(twist: FloatArray, p: FloatArray) -> FloatArray:
     """Return what the shaft carries less than its spring would: up to half a gap's worth, and a stage's more."""
     half = 0.5 * p[slots.GAP]
     missing = np.clip(twist, -half, half)
-    beyond = np.abs(twist) - half - p[slots.STAGE_FROM]
-    more = p[slots.STAGE] * np.sign(twist) * np.maximum(beyond, 0.0)
+    beyond = np.abs(twist) - half - p[_STAGE_FROM]
+    more = p[_STAGE] * np.sign(twist) * np.maximum(beyond, 0.0)
     return p[slots.K] * (more - missing)
 
 

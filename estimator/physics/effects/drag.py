@@ -261,11 +261,13 @@ ASYMMETRIC_FRICTION = Effect(
 
 
 @compiled
-def cold_part(time_s: float, cold: float, time_constant_s: float) -> float:
-    """Return the viscous friction that has not gone away yet [Nm s/rad]."""
+def warming_law(
+    damping: float, time_s: float, length_s: float, cold: float, time_constant_s: float, warm: float
+) -> float:
+    """Return the viscous friction with what has not gone away yet [Nm s/rad]."""
     if every(cold == 0.0):
-        return 0.0
-    return cold * math.exp(-time_s / time_constant_s)
+        return damping
+    return damping + cold * (1.0 - warm) * math.exp(-time_s / time_constant_s)
 
 
 def warming_described(
@@ -290,6 +292,7 @@ WARMING_FRICTION = Effect(
             "warm", "", 0.0, 0.0, 1.0, "share gone at its start: h_0, of each recording", True, True, outlasts=True
         ),
     ),
+    acting=Acting(Place.LOAD_DAMPING, warming_law),
     structures=EVERY_LINE,
     resembles=("torque_derating", "road_grade"),
     scales=lambda _model, records: (0.05 * torque_scale(records) / speed_scale(records), longest_s(records)),

@@ -6,20 +6,22 @@ import math
 from collections.abc import Mapping, Sequence
 
 from estimator.compiled import compiled
-from estimator.lanes import choose, every
+from estimator.lanes import every
 from estimator.physics.driveline import Driveline, Motion, unit
 from estimator.physics.effect import (
     EVERY_LINE,
     MOMENTS,
     WITH_SHAFT,
+    Acting,
     Effect,
     EffectParameter,
     Element,
     Held,
     OtherForm,
+    Place,
     Untestable,
 )
-from estimator.physics.laws import fading, smooth_sign
+from estimator.physics.laws import LEAST, fading, share_inside
 from estimator.physics.motion import reverses, speed_scale, torque_scale, turns
 from estimator.signals.record import Record
 
@@ -53,6 +55,12 @@ LOAD_PRESLIDING = EffectParameter(
     True,
     form="presliding",
 )
+
+
+@compiled
+def coulomb_law(speed: float, friction: float, presliding: float, creep: float) -> float:
+    """Return ``T_c``, the friction torque while it slides."""
+    return friction
 
 
 def motor_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -99,6 +107,7 @@ COULOMB_FRICTION_MOTOR = Effect(
         PRESLIDING,
         CREEP,
     ),
+    acting=Acting(Place.MOTOR_DRY, coulomb_law),
     structures=EVERY_LINE,
     resembles=("stribeck_friction", "quadratic_friction", "backlash", "shaft_hysteresis", "coulomb_friction_load"),
     scales=motor_scales,
@@ -111,6 +120,12 @@ COULOMB_FRICTION_MOTOR = Effect(
 
 
 # Dry friction on the load side: a constant torque against the motion.
+
+
+@compiled
+def load_coulomb_law(time_s: float, length_s: float, friction: float, presliding: float, creep: float) -> float:
+    """Return ``T_c``, the friction torque while it slides."""
+    return friction
 
 
 def load_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -148,6 +163,7 @@ COULOMB_FRICTION_LOAD = Effect(
         LOAD_PRESLIDING,
         CREEP,
     ),
+    acting=Acting(Place.LOAD_DRY, load_coulomb_law),
     structures=WITH_SHAFT,
     resembles=("coulomb_friction_motor", "stribeck_friction", "brake_drag"),
     scales=load_scales,
@@ -163,13 +179,14 @@ COULOMB_FRICTION_LOAD = Effect(
 
 
 @compiled
-def stribeck_law(speed: float, excess: float, coulomb: float, stribeck_speed: float, width: float) -> float:
-    """Return ``(T_c + T_x exp(-(w/w_s)^2)) sign(w)``, the friction torque against the motion."""
-    if every(stribeck_speed <= 0.0):
-        return 0.0
-    ratio = speed / stribeck_speed
-    torque = (coulomb + excess * fading(ratio * ratio)) * smooth_sign(speed, width)
-    return choose(stribeck_speed > 0.0, torque, 0.0)
+def stribeck_law(
+    speed: float, excess: float, coulomb: float, stribeck_speed: float, presliding: float, creep: float
+) -> float:
+    """Return ``T_c + T_x exp(-(w/w_s)^2)``, the friction torque while it slides."""
+    if every(excess == 0.0):
+        return coulomb
+    ratio = speed / max(stribeck_speed, LEAST)
+    return coulomb + excess * fading(ratio * ratio)
 
 
 def stribeck_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -220,6 +237,8 @@ STRIBECK_FRICTION = Effect(
         PRESLIDING,
         CREEP,
     ),
+    acting=Acting(Place.MOTOR_DRY, stribeck_law),
+    either=("excess_nm", "coulomb_nm"),
     structures=EVERY_LINE,
     resembles=("coulomb_friction_motor", "backlash", "coulomb_friction_load"),
     contains=("coulomb_friction_motor",),
@@ -233,6 +252,14 @@ STRIBECK_FRICTION = Effect(
 
 
 # A brake that drags for a while.
+
+
+@compiled
+def brake_law(
+    time_s: float, length_s: float, brake: float, presliding: float, creep: float, from_s: float, to_s: float
+) -> float:
+    """Return the braking torque, from one moment to the next [Nm]."""
+    return share_inside(time_s, length_s, from_s, to_s) * brake
 
 
 def brake_reparametrised(
@@ -259,6 +286,7 @@ BRAKE_DRAG = Effect(
         CREEP,
         *MOMENTS,
     ),
+    acting=Acting(Place.LOAD_DRY, brake_law),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "coulomb_friction_load", "road_grade"),
     event=True,

@@ -13,43 +13,20 @@ from estimator.physics.effect import (
     EVERY_LINE,
     MOMENTS,
     WITH_SHAFT,
+    Acting,
     Effect,
     EffectParameter,
     Element,
     FitStart,
     Held,
     OtherForm,
+    Place,
     Span,
     Step,
     Within,
 )
+from estimator.physics.laws import inertia_while, share_inside
 from estimator.signals.record import Record
-
-# The clutch to the generator is not open: its inertia turns with the motor for a while.
-
-
-GENERATOR_COUPLED = Effect(
-    name="generator_coupled",
-    element=Element.MOTOR,
-    title="generator coupled",
-    law="J_M becomes J_M + J_G from t_1 to t_2 of a recording",
-    source="hybrid bus whose coupling to the generator opens: Nevaranta, Montonen, Lindh, EPE'18, 2018",
-    excited_by="PRBS or torque steps while the clutch is closed",
-    parameters=(
-        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 20.0, "inertia that is coupled: J_G"),
-        *MOMENTS,
-    ),
-    structures=EVERY_LINE,
-    resembles=("stiffness_change", "brake_drag", "inertia_change"),
-    event=True,
-    scales=lambda model, _records: (0.5 * model.parameters["J_M"].value,),
-    starts=lambda _model, _records: [(0.3,), (1.5,)],
-    text="an extra inertia of {inertia_kg_m2:.3g} {unit[inertia]} turns with the motor: clutch not open",
-    linear=True,
-)
-
-
-# The payload steps: people get on or off.
 
 MOST_DAMPING = 0.15  # steel shafts and their rubber couplings stay below this damping ratio of their own
 LEAST_AMPLIFIED = 2.0  # by which a resonance amplifies at least, ``1 / (2 zeta)``, whatever damps it
@@ -68,6 +45,40 @@ NEAR_HALF_RATE = 0.4
 fit may end at its image on the other side of half the rate."""
 
 ABOVE = 5.0  # frequency over the line's own near which it is looked for where the samples are fast
+
+
+# The clutch to the generator is not open: its inertia turns with the motor for a while.
+
+
+@compiled
+def coupled_law(inertia: float, time_s: float, length_s: float, extra: float, from_s: float, to_s: float) -> float:
+    """Return an inertia with another one on it from one moment to the next [kg m^2]."""
+    return inertia_while(inertia, extra, share_inside(time_s, length_s, from_s, to_s))
+
+
+GENERATOR_COUPLED = Effect(
+    name="generator_coupled",
+    element=Element.MOTOR,
+    title="generator coupled",
+    law="J_M becomes J_M + J_G from t_1 to t_2 of a recording",
+    source="hybrid bus whose coupling to the generator opens: Nevaranta, Montonen, Lindh, EPE'18, 2018",
+    excited_by="PRBS or torque steps while the clutch is closed",
+    parameters=(
+        EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 20.0, "inertia that is coupled: J_G"),
+        *MOMENTS,
+    ),
+    acting=Acting(Place.MOTOR_INERTIA, coupled_law),
+    structures=EVERY_LINE,
+    resembles=("stiffness_change", "brake_drag", "inertia_change"),
+    event=True,
+    scales=lambda model, _records: (0.5 * model.parameters["J_M"].value,),
+    starts=lambda _model, _records: [(0.3,), (1.5,)],
+    text="an extra inertia of {inertia_kg_m2:.3g} {unit[inertia]} turns with the motor: clutch not open",
+    linear=True,
+)
+
+
+# The payload steps: people get on or off.
 
 
 def payload_described(
@@ -90,6 +101,7 @@ INERTIA_CHANGE = Effect(
         EffectParameter("change_kg_m2", "inertia", 0.0, -7.0, 40.0, "change of the inertia: delta"),
         *MOMENTS,
     ),
+    acting=Acting(Place.LOAD_INERTIA, coupled_law),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "road_grade"),
     event=True,

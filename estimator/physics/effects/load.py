@@ -22,7 +22,7 @@ from estimator.physics.effect import (
     Place,
     Untestable,
 )
-from estimator.physics.laws import hyperbolic_tangent
+from estimator.physics.laws import hyperbolic_tangent, overtoned_wave
 from estimator.physics.motion import goes_round, range_of, speed_scale, torque_scale
 from estimator.signals.record import FloatArray, Record
 
@@ -91,6 +91,12 @@ ROAD_GRADE = Effect(
 # An unbalanced, a little oval wheel: a load torque once and twice per wheel turn.
 
 
+@compiled
+def imbalance_law(angle: float, amplitude: float, turns: float, in_step: float, across: float, phase: float) -> float:
+    """Return ``A (cos(x) + a cos(2 x) + b sin(2 x))``, ``x = phi_M / i + alpha`` [Nm], against the load."""
+    return overtoned_wave(amplitude, angle / turns, phase, in_step, across)
+
+
 def imbalance_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
     """Need a known gear ratio, and a load that makes more than a whole turn."""
     if model.gear_ratio is None:
@@ -115,6 +121,7 @@ LOAD_IMBALANCE = Effect(
         EffectParameter("overtone_across", "", 0.0, -5.0, 5.0, "the same a quarter of its turn on: b", True),
         EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha, of each recording", True, True),
     ),
+    acting=Acting(Place.RECORDED_ANGLE, imbalance_law),
     structures=EVERY_LINE,
     resembles=("torque_ripple", "cardan_second_order", "road_grade"),
     phases={"phase_rad": "amplitude_nm"},

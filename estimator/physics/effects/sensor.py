@@ -8,9 +8,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.lanes import some
+from estimator.lanes import every, some
 from estimator.physics.driveline import Driveline, Motion
-from estimator.physics.effect import EVERY_LINE, EVERY_STRUCTURE, Effect, EffectParameter, Element, Untestable
+from estimator.physics.effect import (
+    EVERY_LINE,
+    EVERY_STRUCTURE,
+    Acting,
+    Effect,
+    EffectParameter,
+    Element,
+    Place,
+    Untestable,
+)
 from estimator.physics.motion import measured_speed, speed_scale
 from estimator.signals.record import OutputKind, Record
 
@@ -23,6 +32,13 @@ STEEPEST = -0.5
 STANDSTILL = 0.05  # share of its top speed below which a recording comes to standstill between two samples
 LEAST_SHARE = 0.5  # share of the magnitude from which a sensor's own motion has no sign left
 
+
+@compiled
+def quantised_law(reading: float, step: float) -> float:
+    """Return the step nearest to a reading [rad/s]."""
+    return step * math.floor(reading / step + 0.5) if step > 0.0 else reading
+
+
 SPEED_QUANTISATION = Effect(
     name="speed_quantisation",
     element=Element.SPEED_SENSOR,
@@ -31,6 +47,7 @@ SPEED_QUANTISATION = Effect(
     source="Widrow, Kollar: Quantization Noise, Cambridge 2008",
     excited_by="a speed that passes many steps",
     parameters=(EffectParameter("step_rad_s", "speed", 0.0, 0.0, float("inf"), "step q"),),
+    acting=Acting(Place.SENSOR, quantised_law),
     structures=EVERY_LINE,
     resembles=(),
     text="the speed is read in steps of {step_rad_s:.3g} {unit[speed]}",
@@ -68,6 +85,15 @@ def true_angle(read: float, once: float, once_phase: float, twice: float, twice_
     return angle
 
 
+@compiled
+def resolver_law(speed: float, angle: float, once: float, twice: float, once_phase: float, twice_phase: float) -> float:
+    """Return the speed that the resolver gives [rad/s] where it gives an angle [rad]: a recording knows no other."""
+    if every(once == 0.0) and every(twice == 0.0):
+        return speed
+    true = true_angle(angle, once, once_phase, twice, twice_phase)
+    return speed * resolver_slope(true, once, once_phase, twice, twice_phase)
+
+
 def resolver_sentence(values: Mapping[str, float], motion: Motion) -> str:
     """State the angle errors once and twice per turn."""
     return (
@@ -89,6 +115,7 @@ RESOLVER_ERROR = Effect(
         EffectParameter("once_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha_1, of each recording", True, True),
         EffectParameter("twice_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha_2, of each recording", True, True),
     ),
+    acting=Acting(Place.RESOLVER, resolver_law),
     structures=EVERY_LINE,
     resembles=("torque_ripple", "cardan_second_order", "speed_sign_blind"),
     kinds=frozenset({OutputKind.SPEED}),
@@ -101,6 +128,12 @@ RESOLVER_ERROR = Effect(
 
 
 # The sensor reads the magnitude of the speed.
+
+
+@compiled
+def blind_law(reading: float, share: float) -> float:
+    """Return ``(1 - s) y + s |y|`` [rad/s]."""
+    return reading + share * (abs(reading) - reading)
 
 
 def blind_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
@@ -125,6 +158,7 @@ SPEED_SIGN_BLIND = Effect(
     source="pick-up with a single track: Fraden, Handbook of Modern Sensors, 5th ed., Springer 2016",
     excited_by="speed that changes sign: reversal",
     parameters=(EffectParameter("share", "", 0.0, 0.0, 1.0, "share of the magnitude: s", most=1.0),),
+    acting=Acting(Place.SENSOR, blind_law),
     structures=EVERY_LINE,
     resembles=("resolver_error",),
     kinds=frozenset({OutputKind.SPEED}),

@@ -26,7 +26,7 @@ from estimator.physics.effect import (
     Untestable,
     long_enough,
 )
-from estimator.physics.laws import beyond_gap, fading, power
+from estimator.physics.laws import beyond_gap, fading, power, share_inside, wave
 from estimator.physics.motion import goes_round, speed_sweeps, torque_reverses, torque_scale
 from estimator.signals.record import Record
 
@@ -149,7 +149,7 @@ def stiffness_factor(twist: float, hardening: float, shape: float) -> float:
 
 
 @compiled
-def loaded_twist(twist: float, hardening: float, shape: float, stage: float, stage_from: float) -> float:
+def spring_law(twist: float, hardening: float, shape: float, stage: float, stage_from: float) -> float:
     """Return the twist at which a linear shaft carries the same torque [rad]."""
     same = twist * stiffness_factor(twist, hardening, shape)
     if every(stage == 0.0):
@@ -203,6 +203,8 @@ STIFFNESS_NONLINEARITY = Effect(
         EffectParameter("stage_share", "", 0.0, -1.0, 10.0, "stiffness that a second stage adds, over k: s", True),
         EffectParameter("stage_rad", "angle", 0.0, 0.02, 1.0, "twist from which on it is loaded: e_2", True),
     ),
+    acting=Acting(Place.SPRING, spring_law),
+    either=("hardening_per_rad2", "stage_share"),
     structures=WITH_SPRING,
     resembles=("torque_saturation", "backlash", "stiffness_change", "shaft_hysteresis", "extra_torsional_mode"),
     scales=stiffness_scales,
@@ -215,6 +217,12 @@ STIFFNESS_NONLINEARITY = Effect(
 
 
 # The shaft's stiffness steps at a moment, as when it cracks.
+
+
+@compiled
+def cracked_law(stiffness: float, time_s: float, length_s: float, change: float, from_s: float, to_s: float) -> float:
+    """Return a stiffness that is changed by a share of itself from one moment to the next [Nm/rad]."""
+    return stiffness * (1.0 + share_inside(time_s, length_s, from_s, to_s) * change)
 
 
 def stiffness_step_described(
@@ -236,6 +244,7 @@ STIFFNESS_CHANGE = Effect(
         EffectParameter("change", "", 0.0, -0.95, 5.0, "relative change of the stiffness: delta"),
         *MOMENTS,
     ),
+    acting=Acting(Place.STIFFNESS, cracked_law),
     structures=WITH_SPRING,
     resembles=("generator_coupled", "backlash", "stiffness_nonlinearity"),
     event=True,
@@ -386,6 +395,20 @@ VISCOELASTIC_SHAFT = Effect(
 # Cardan joints at an angle: a torque twice per motor turn in the shaft.
 
 
+@compiled
+def cardan_law(
+    angle: float, torque: float, imposed: float, share: float, phase: float, imposed_phase: float, share_phase: float
+) -> tuple[float, float, float, float]:
+    """Return the torque that the joints add [Nm], its share of the shaft's, the angle that they impose, its slope."""
+    twice = 2.0 * angle
+    return (
+        wave(torque, twice, phase),
+        wave(share, twice, share_phase),
+        wave(imposed, twice, imposed_phase),
+        2.0 * wave(imposed, twice, imposed_phase + 0.5 * math.pi),
+    )
+
+
 def cardan_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
     """Return a twentieth of the torque in use, the twist that it gives, and a twentieth."""
     torque = 0.05 * torque_scale(records)
@@ -433,6 +456,7 @@ CARDAN_SECOND_ORDER = Effect(
         EffectParameter("angle_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of a, of each recording", True, True),
         EffectParameter("share_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of r, of each recording", True, True),
     ),
+    acting=Acting(Place.JOINT, cardan_law),
     structures=WITH_SHAFT,
     resembles=("torque_ripple", "load_imbalance", "resolver_error"),
     phases={"phase_rad": "amplitude_nm", "angle_phase_rad": "angle_rad", "share_phase_rad": "share"},

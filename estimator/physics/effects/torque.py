@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from estimator.compiled import compiled
 from estimator.physics.driveline import Driveline, Load, Motion, unit
 from estimator.physics.effect import (
     EVERY_LINE,
@@ -20,6 +21,7 @@ from estimator.physics.effect import (
     Place,
     Untestable,
 )
+from estimator.physics.laws import overtoned_wave
 from estimator.physics.motion import (
     goes_round,
     largest_torque,
@@ -342,6 +344,25 @@ TORQUE_BIAS = Effect(
 # A torque ripple whose frequency follows the motor's speed.
 
 
+@compiled
+def ripple_law(
+    angle: float,
+    amplitude: float,
+    share: float,
+    order: float,
+    in_step: float,
+    across: float,
+    phase: float,
+    share_phase: float,
+) -> tuple[float, float]:
+    """Return the torque of cogging [Nm], and the share of the drive's own torque by which it ripples."""
+    turned = order * angle
+    return (
+        overtoned_wave(amplitude, turned, phase, in_step, across),
+        overtoned_wave(share, turned, share_phase, in_step, across),
+    )
+
+
 def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
     """Return two starts per order that machines show, one per cause; the order is a whole number and not fitted.
 
@@ -391,6 +412,7 @@ TORQUE_RIPPLE = Effect(
         EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of A, of each recording", True, True),
         EffectParameter("share_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of r, of each recording", True, True),
     ),
+    acting=Acting(Place.DRIVE_ANGLE, ripple_law),
     structures=EVERY_LINE,
     resembles=("cardan_second_order", "load_imbalance", "resolver_error"),
     phases={"phase_rad": "amplitude_nm", "share_phase_rad": "share"},

@@ -9,29 +9,34 @@ import numpy as np
 
 from estimator.compiled import inlined
 from estimator.lanes import broadcast_as, choose, every, some
-from estimator.physics.catalogue import BUILT_IN, KERNEL
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.curve import curve, wrapped
-from estimator.physics.effects.drag import cold_part
 from estimator.physics.effects.inertia import frequency_within
 from estimator.physics.kernel import slots
-from estimator.physics.kernel.laws_at import has_states, over_recorded_angle
+from estimator.physics.kernel.laws_at import (
+    has_law_in_shaft,
+    has_states,
+    in_joint,
+    load_creep,
+    load_damping,
+    load_inertia,
+    load_presliding,
+    load_sliding,
+    motor_creep,
+    motor_inertia,
+    motor_presliding,
+    motor_sliding,
+    over_motor_angle,
+    over_recorded_angle,
+    shaft_stiffness,
+)
 from estimator.physics.kernel.state_vector import Bristles, Conditions, State, Tyre
-from estimator.physics.laws import LEAST, fading, inertia_while, overtoned_wave, share_inside, wave
+from estimator.physics.laws import LEAST, fading
 from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
 STICK_STABILITY = 1.5
 """Runge-Kutta is stable to h * slope / J = 2.78; friction's slope at standstill is held to about half of it."""
-
-WAVING = np.array(
-    [
-        slot(entry.name, name)
-        for entry in KERNEL.values()
-        if entry.waving
-        for name in entry.phases.values() or [entry.parameters[0].name]
-    ]
-)
-"""Sizes of the laws over the angle, or over the time."""
 
 EVENTS = np.array(
     [
@@ -55,10 +60,7 @@ class Line(NamedTuple):
 @inlined
 def is_elastic(p: FloatArray) -> bool:
     """Tell whether the first shaft is a spring and a damper, and no law next to them."""
-    bent = p[slots.GAP] > 0.0 or p[slots.HARDENING] != 0.0 or p[slots.STAGE] != 0.0
-    jointed = p[slots.CARDAN] != 0.0 or p[slots.CARDAN_ANGLE] != 0.0 or p[slots.CARDAN_SHARE] != 0.0
-    tabled = p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0
-    return not (bent or jointed or tabled)
+    return not (has_law_in_shaft(p) or p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0)
 
 
 @inlined
@@ -70,13 +72,13 @@ def is_bristled(p: FloatArray) -> bool:
 @inlined
 def is_bristled_at_motor(p: FloatArray) -> bool:
     """Tell whether dry friction at the motor deflects before it slides."""
-    return some(p[slots.COULOMB_PRESLIDING] > 0.0) or some(p[slots.STRIBECK_PRESLIDING] > 0.0)
+    return some(motor_presliding(p) > 0.0)
 
 
 @inlined
 def is_bristled_at_load(p: FloatArray) -> bool:
     """Tell whether dry friction at the load deflects before it slides, that of a brake included."""
-    return some(p[slots.COULOMB_LOAD_PRESLIDING] > 0.0) or some(p[slots.BRAKE_PRESLIDING] > 0.0)
+    return some(load_presliding(p) > 0.0)
 
 
 @inlined
@@ -89,15 +91,6 @@ def is_extended(p: FloatArray) -> bool:
 def is_within(p: FloatArray) -> bool:
     """Tell whether the inertia of an extra mode is in the line, before the shaft or behind it, and not next to it."""
     return some(p[slots.BETWEEN] > 0.0) or some(p[slots.BEHIND] > 0.0)
-
-
-@inlined
-def is_waving(p: FloatArray) -> bool:
-    """Tell whether the conditions change all the time: by a law over the angle, or over time."""
-    for i in range(WAVING.size):
-        if p[WAVING[i]] != 0.0:
-            return True
-    return False
 
 
 @inlined
@@ -142,57 +135,40 @@ def conditions(
     masses: int, time_s: float, h: float, angle: float, load: float, sign_width: float, p: FloatArray
 ) -> Conditions:
     """Return what holds during the sub-step of length ``h`` [s] from ``time_s`` on, at a motor angle [rad]."""
-    coupled = share_inside(time_s, h, p[slots.GENERATOR_FROM], p[slots.GENERATOR_TO])
-    cracked = share_inside(time_s, h, p[slots.CRACK_FROM], p[slots.CRACK_TO])
-    loaded = share_inside(time_s, h, p[slots.PAYLOAD_FROM], p[slots.PAYLOAD_TO])
-    braked = share_inside(time_s, h, p[slots.BRAKE_FROM], p[slots.BRAKE_TO])
-    turned, overtone = p[slots.RIPPLE_ORDER] * angle, (p[slots.RIPPLE_IN_STEP], p[slots.RIPPLE_ACROSS])
-    ripple = overtoned_wave(p[slots.RIPPLE], turned, p[slots.RIPPLE_PHASE], *overtone)
-    torque_factor = 1.0 + overtoned_wave(p[slots.RIPPLE_SHARE], turned, p[slots.RIPPLE_SHARE_PHASE], *overtone)
-    rolled, oval = angle / p[slots.IMBALANCE_RATIO], (p[slots.IMBALANCE_IN_STEP], p[slots.IMBALANCE_ACROSS])
+    torque, torque_share = over_motor_angle(angle, p)
+    shaft, shaft_share, joint_angle, joint_rate = in_joint(angle, p)
     if some(p[slots.TABLE_ANGLE] > 0.0):
         load += curve(wrapped(angle + p[slots.TABLE_PHASE], p, slots.TABLE_ANGLE), p, slots.TABLE_ANGLE, True)[0]
-    load += over_recorded_angle(angle, p) + overtoned_wave(p[slots.IMBALANCE], rolled, p[slots.IMBALANCE_PHASE], *oval)
-    cardan = wave(p[slots.CARDAN], 2.0 * angle, p[slots.CARDAN_PHASE])
-    shaft_factor = 1.0 + wave(p[slots.CARDAN_SHARE], 2.0 * angle, p[slots.CARDAN_SHARE_PHASE])
-    joint_angle = wave(p[slots.CARDAN_ANGLE], 2.0 * angle, p[slots.CARDAN_ANGLE_PHASE])
-    joint_rate = 2.0 * wave(p[slots.CARDAN_ANGLE], 2.0 * angle, p[slots.CARDAN_ANGLE_PHASE] + 0.5 * math.pi)
-    inertia_motor = inertia_while(p[slots.J_M], p[slots.GENERATOR], coupled)
-    inertia_load = inertia_while(p[slots.J_L], p[slots.PAYLOAD], loaded) if masses > 1 else 0.0
+    load += over_recorded_angle(angle, p)
+    inertia_motor = motor_inertia(p[slots.J_M], time_s, h, p)
+    inertia_load = load_inertia(p[slots.J_L], time_s, h, p) if masses > 1 else 0.0
     if masses == 1:
-        inertia_motor = inertia_while(inertia_motor, p[slots.PAYLOAD], loaded)
-    dry_motor = abs(p[slots.COULOMB]) + abs(p[slots.STRIBECK]) + abs(p[slots.STRIBECK_COULOMB])
-    dry_load = p[slots.COULOMB_LOAD] + braked * p[slots.BRAKE]
+        inertia_motor = load_inertia(inertia_motor, time_s, h, p)
+    dry_motor, dry_load = breakaway(p), load_sliding(time_s, h, p)
     wheel_inertia = choose(p[slots.SLIP] > 0.0, p[slots.SLIP_WHEEL] * inertia_load, inertia_load)
     carried = inertia_motor if masses == 1 else wheel_inertia
     fastest = STICK_STABILITY / h
     lightest = min(inertia_motor, p[slots.J_2] if masses == 3 else carried)
     if is_within(p):
         lightest = min(lightest, branch_inertia(p))
-    stiffness = p[slots.K] * line_share(p) * (1.0 + cracked * p[slots.CRACK])
     return Conditions(
-        ripple,
+        torque,
         load,
         broadcast_as(0.0, load),
-        torque_factor,
-        cardan,
-        shaft_factor,
+        1.0 + torque_share,
+        shaft,
+        1.0 + shaft_share,
         joint_angle,
         joint_rate,
         1.0 / inertia_motor,
         inertia_load,
         1.0 / inertia_load if masses > 1 else 0.0,
-        stiffness,
-        p[slots.B_L] + cold_part(time_s, p[slots.WARMING] * (1.0 - p[slots.WARMED]), p[slots.WARMING_TIME]),
+        shaft_stiffness(p[slots.K] * line_share(p), time_s, h, p),
+        load_damping(p[slots.B_L], time_s, h, p),
         dry_motor,
         dry_load,
-        max(
-            changing_sign(sign_width, p[slots.COULOMB_CREEP], p[slots.STRIBECK_CREEP]),
-            dry_motor / (fastest * inertia_motor),
-        ),
-        max(
-            changing_sign(sign_width, p[slots.COULOMB_LOAD_CREEP], p[slots.BRAKE_CREEP]), dry_load / (fastest * carried)
-        ),
+        max(changing_sign(sign_width, motor_creep(p)), dry_motor / (fastest * inertia_motor)),
+        max(changing_sign(sign_width, load_creep(p)), dry_load / (fastest * carried)),
         branch_inertia(p),
         branch_frequency(p),
         fastest,
@@ -202,10 +178,9 @@ def conditions(
 
 
 @inlined
-def changing_sign(width: float, creep: float, other: float) -> float:
+def changing_sign(width: float, creep: float) -> float:
     """Return the speed within which dry friction changes sign [rad/s]: the usual one where no law creeps."""
-    widest = max(creep, other)
-    return choose(widest > 0.0, widest, width)
+    return choose(creep > 0.0, creep, width)
 
 
 @inlined
@@ -276,14 +251,7 @@ def with_torque(now: Conditions, torque: float) -> Conditions:
 @inlined
 def breakaway(p: FloatArray) -> float:
     """Return the dry friction of all laws at the motor, next to standstill [Nm]."""
-    return float(p[slots.COULOMB] + p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK])
-
-
-@inlined
-def sliding(speed: float, p: FloatArray) -> float:
-    """Return what they come to while it slides at a speed [Nm]."""
-    ratio = speed / max(p[slots.STRIBECK_SPEED], LEAST)
-    return p[slots.COULOMB] + p[slots.STRIBECK_COULOMB] + p[slots.STRIBECK] * fading(ratio * ratio)
+    return motor_sliding(broadcast_as(0.0, p[slots.J_M]), p)
 
 
 @inlined
@@ -302,9 +270,9 @@ def followed(torque: float, speed: float, limit: float, stiffness: float, time_s
 @inlined
 def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
     """Return the torque of the motor's bristles after a time at the speed of a state [Nm]."""
-    stiff = breakaway(p) / max(p[slots.COULOMB_PRESLIDING], p[slots.STRIBECK_PRESLIDING])
+    stiff = breakaway(p) / motor_presliding(p)
     stiff = min(stiff, now.fastest * now.fastest / now.inverse_motor)
-    return followed(torque, x.speed, sliding(x.speed, p), stiff, time_s)
+    return followed(torque, x.speed, motor_sliding(x.speed, p), stiff, time_s)
 
 
 @inlined
@@ -316,7 +284,7 @@ def at_load(line: Line, torque: float, x: State, now: Conditions, p: FloatArray,
     elif line.extended and some(p[slots.SLIP] > 0.0):
         inverse_inertia = now.tyre.inverse_wheel
     limit = now.dry_load
-    stiff = limit / max(p[slots.COULOMB_LOAD_PRESLIDING], p[slots.BRAKE_PRESLIDING])
+    stiff = limit / load_presliding(p)
     stiff = min(stiff, now.fastest * now.fastest / inverse_inertia)
     return followed(min(max(torque, -limit), limit), speed, limit, stiff, time_s)
 

@@ -21,11 +21,11 @@ from estimator.physics.kernel.conditions import (
     is_changing,
     is_elastic,
     is_extended,
-    is_waving,
     is_within,
     rubbed,
     with_torques,
 )
+from estimator.physics.kernel.laws_at import resolved, waves
 from estimator.physics.kernel.linear import (
     WORTHWHILE_SAMPLES,
     StepResponses,
@@ -35,7 +35,7 @@ from estimator.physics.kernel.linear import (
     next_linear_state,
 )
 from estimator.physics.kernel.rates import at_moment, read_out
-from estimator.physics.kernel.sensing import entry, reading, shown, smoothed
+from estimator.physics.kernel.sensing import entry, shown, smoothed
 from estimator.physics.kernel.state_vector import (
     BRISTLES_LOAD,
     BRISTLES_MOTOR,
@@ -236,7 +236,7 @@ def integrate_made(  # one question more than usual, and a change costs each use
     length = 1.0 / substeps
     feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
-    waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
+    waving, filtering = waves(p), p[slots.FILTER] > 0.0
     steep, following = slopes.shape[1] > 0, followed.shape[0] > 0
     slope = slope_before(first, slopes)
     output = outputs[0]
@@ -253,7 +253,7 @@ def integrate_made(  # one question more than usual, and a change costs each use
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         for i in range(outputs.shape[0]):
             value = read_out(line, now, x, outputs[i], p)
-            out[i, k] = shown(reading(value, angle[k], p), filtered, p) if sensor and i == 0 else value
+            out[i, k] = shown(resolved(value, angle[k], p), filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
         if following:
             x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[0, k]), output)

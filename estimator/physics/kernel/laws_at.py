@@ -1,4 +1,4 @@
-"""The catalogue's laws at their places: functions that add them up, written from what the entries declare.
+"""The catalogue's laws at their places: functions that put them together, written from what the entries declare.
 
 Each is a few lines of Python text (`written`). They are compiled into the simulation that calls them, of one line or of
 several in lanes, and they are what an exported FMU has in C.
@@ -6,10 +6,12 @@ several in lanes, and they are what an exported FMU has in C.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from types import GenericAlias
+from typing import Any
 
 from estimator.lanes import broadcast_as, some
-from estimator.physics.catalogue import BUILT_IN
+from estimator.physics.catalogue import BUILT_IN, KERNEL
 from estimator.physics.effect import Around, Effect, Place
 from estimator.physics.kernel.state_vector import LAW_STATES, WITH_STATE, LawStates
 from estimator.physics.kernel.written import Scope, several, written
@@ -17,12 +19,23 @@ from estimator.physics.layout import slot
 from estimator.signals.record import FloatArray
 
 GIVEN = {
+    Place.DRIVE_ANGLE: ("angle",),
     Place.MOTOR: ("speed",),
+    Place.MOTOR_DRY: ("speed",),
+    Place.MOTOR_INERTIA: ("inertia", "time_s", "length_s"),
+    Place.JOINT: ("angle",),
+    Place.STIFFNESS: ("stiffness", "time_s", "length_s"),
+    Place.SPRING: ("twist",),
+    Place.SHAFT: ("twist", "rate"),
+    Place.SHAFT_LOSS: ("torque", "direction"),
     Place.LOAD: ("speed",),
+    Place.LOAD_DRY: ("time_s", "length_s"),
+    Place.LOAD_DAMPING: ("damping", "time_s", "length_s"),
+    Place.LOAD_INERTIA: ("inertia", "time_s", "length_s"),
     Place.LOAD_ANGLE: ("angle",),
     Place.RECORDED_ANGLE: ("angle",),
-    Place.SHAFT_LOSS: ("torque", "direction"),
-    Place.SHAFT: ("twist", "rate"),
+    Place.RESOLVER: ("speed", "angle"),
+    Place.SENSOR: ("reading",),
 }
 """What a place gives its laws before their parameters; one with a state gets that and what is around it, too."""
 
@@ -54,16 +67,37 @@ def is_on(entry: Effect) -> str:
     return f"some(p[{slot(entry.name, entry.parameters[0].name)}] != {entry.parameters[0].null!r})"
 
 
+def called(entry: Effect, place: Place) -> str:
+    """Return the call of an entry's law without a state."""
+    return f"{entry.name}_law({', '.join(GIVEN[place])}, {parameters_of(entry)})"
+
+
+def given_at(place: Place) -> dict[str, object]:
+    """Return the arguments of a place's function and their types."""
+    return {**dict.fromkeys(GIVEN[place], float), "p": FloatArray}
+
+
 def total(place: Place, name: str) -> Callable[..., float]:
     """Return the sum of a place's laws without a state [Nm], of what it gives and the parameters."""
-    given = GIVEN[place]
-    calls = [
-        f"{each.name}_law({', '.join(given)}, {parameters_of(each)})"
-        for each in at_place(place)
-        if each not in WITH_STATE
-    ]
-    body = [f"return {' + '.join([f'broadcast_as(0.0, {given[0]})', *calls])}"]
-    return written(name, {**dict.fromkeys(given, float), "p": FloatArray}, float, body, SCOPE)
+    calls = [called(each, place) for each in at_place(place) if each not in WITH_STATE]
+    body = [f"return {' + '.join([f'broadcast_as(0.0, {GIVEN[place][0]})', *calls])}"]
+    return written(name, given_at(place), float, body, SCOPE)
+
+
+def totals(place: Place, name: str, values: int) -> Callable[..., Any]:
+    """Return the sums of what a place's laws return, several values each."""
+    laws = list(at_place(place))
+    body = [f"law{i} = {called(each, place)}" for i, each in enumerate(laws)]
+    sums = (" + ".join(f"law{i}[{value}]" for i in range(len(laws))) or "0.0" for value in range(values))
+    returned = GenericAlias(tuple, (float,) * values)
+    return written(name, given_at(place), returned, [*body, f"return {several(sums)}"], SCOPE)
+
+
+def changed(place: Place, name: str) -> Callable[..., float]:
+    """Return what a place's laws make of the first that it gives, one behind the other."""
+    value = GIVEN[place][0]
+    body = [*(f"{value} = {called(each, place)}" for each in at_place(place)), f"return {value}"]
+    return written(name, given_at(place), float, body, SCOPE)
 
 
 def total_with_states(place: Place, name: str) -> Callable[..., float]:
@@ -92,16 +126,56 @@ def rates_of_states(name: str) -> Callable[..., LawStates]:
     return written(name, types, LawStates, body, SCOPE)
 
 
+def largest(places: Iterable[Place], parameter: str, name: str) -> Callable[[FloatArray], float]:
+    """Return the largest value that a parameter of this name has among the laws at some places."""
+    entries = (each for place in places for each in at_place(place))
+    values = [f"p[{slot(each.name, parameter)}]" for each in entries]
+    body = ["value = " + values[0], *(f"value = max(value, {each})" for each in values[1:]), "return value"]
+    return written(name, {"p": FloatArray}, float, body, SCOPE)
+
+
+def any_on(entries: Iterable[Effect], name: str) -> Callable[[FloatArray], bool]:
+    """Return whether a size of one of some entries is off its null."""
+    off = [
+        f"some(p[{slot(each.name, parameter.name)}] != {parameter.null!r})"
+        for each in entries
+        for parameter in each.parameters
+        if parameter.name in each.sizes
+    ]
+    return written(name, {"p": FloatArray}, bool, [f"return {' | '.join(off)}"], SCOPE)
+
+
+over_motor_angle = totals(Place.DRIVE_ANGLE, "over_motor_angle", 2)
 motor_drag = total(Place.MOTOR, "motor_drag")
+motor_sliding = total(Place.MOTOR_DRY, "motor_sliding")
+motor_inertia = changed(Place.MOTOR_INERTIA, "motor_inertia")
+in_joint = totals(Place.JOINT, "in_joint", 4)
+shaft_stiffness = changed(Place.STIFFNESS, "shaft_stiffness")
+spring_twist = changed(Place.SPRING, "spring_twist")
+shaft_loss = total(Place.SHAFT_LOSS, "shaft_loss")
 load_drag = total(Place.LOAD, "load_drag")
+load_sliding = total(Place.LOAD_DRY, "load_sliding")
+load_damping = changed(Place.LOAD_DAMPING, "load_damping")
+load_inertia = changed(Place.LOAD_INERTIA, "load_inertia")
 held_by_angle = total(Place.LOAD_ANGLE, "held_by_angle")
 over_recorded_angle = total(Place.RECORDED_ANGLE, "over_recorded_angle")
-shaft_loss = total(Place.SHAFT_LOSS, "shaft_loss")
+resolved = changed(Place.RESOLVER, "resolved")
+recorded = changed(Place.SENSOR, "recorded")
 
 motor_memory = total_with_states(Place.MOTOR, "motor_memory")
 load_memory = total_with_states(Place.LOAD, "load_memory")
 shaft_memory = total_with_states(Place.SHAFT, "shaft_memory")
 state_rates = rates_of_states("state_rates")
+
+motor_presliding = largest([Place.MOTOR_DRY], "presliding_rad", "motor_presliding")
+load_presliding = largest([Place.LOAD_DRY], "presliding_rad", "load_presliding")
+motor_creep = largest([Place.MOTOR_DRY], "creep_rad_s", "motor_creep")
+load_creep = largest([Place.LOAD_DRY], "creep_rad_s", "load_creep")
+
+has_law_in_shaft = any_on([*at_place(Place.JOINT), *at_place(Place.SPRING), BUILT_IN["backlash"]], "has_law_in_shaft")
+motor_rubs = any_on(at_place(Place.MOTOR_DRY), "motor_rubs")
+load_rubs = any_on(at_place(Place.LOAD_DRY), "load_rubs")
+waves = any_on((each for each in KERNEL.values() if each.waving), "waves")
 
 moved_states: Callable[..., LawStates] = written(
     "moved_states",

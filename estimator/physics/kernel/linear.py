@@ -9,9 +9,8 @@ import numpy as np
 
 from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
-from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import Line, is_bristled, is_bristled_at_motor, with_friction, with_torques
-from estimator.physics.kernel.laws_at import no_states
+from estimator.physics.kernel.laws_at import load_rubs, motor_rubs, motor_sliding, no_states
 from estimator.physics.kernel.rates import advanced, dry_at_load, runge_kutta, stepped
 from estimator.physics.kernel.state_vector import (
     ANGLE,
@@ -72,8 +71,8 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 
     Bristles leave it linear at any speed: what they hold is a torque like another.
     """
-    stribeck = not is_bristled_at_motor(p) and (p[slots.STRIBECK] != 0.0 or p[slots.STRIBECK_COULOMB] != 0.0)
-    if len(line.own) > 0 or not line.elastic or stribeck:
+    falls = not is_bristled_at_motor(p) and motor_sliding(0.0, p) != motor_sliding(np.inf, p)
+    if len(line.own) > 0 or not line.elastic or falls:
         return False
     for i in range(BENDING.size):
         if p[BENDING[i]] != NULLS[i]:
@@ -84,7 +83,7 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 @inlined
 def has_dry_friction(p: FloatArray) -> bool:
     """Tell whether a parameter of dry friction is not at its null."""
-    return bool(is_bristled(p) or p[slots.COULOMB] != 0.0 or p[slots.COULOMB_LOAD] != 0.0 or p[slots.BRAKE] != 0.0)
+    return is_bristled(p) or motor_rubs(p) or load_rubs(p)
 
 
 @inlined
@@ -181,7 +180,7 @@ def answered(
     carried = x.speed if line.masses == 1 else x.load_speed
     torque += now.torque
     if now.dry_motor != 0.0:
-        torque -= dry_friction(x.speed, p[slots.COULOMB], now.width_motor)
+        torque -= dry_friction(x.speed, now.dry_motor, now.width_motor)
     load = now.load + dry_at_load(carried, now)
     after = State(0.0, 0.0, 0.0, 0.0, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, no_states(0.0))
     after = advanced(line, after, to.torque, torque)

@@ -9,9 +9,8 @@ from estimator.lanes import broadcast_as, choose, every, some
 from estimator.lanes.types import overload
 from estimator.physics.curve import curve
 from estimator.physics.effect import Around
-from estimator.physics.effects.dry_friction import stribeck_law
 from estimator.physics.effects.load import build_up, carcass, coupling, gripped
-from estimator.physics.effects.shaft import damping_share, loaded_twist, pressed
+from estimator.physics.effects.shaft import damping_share, pressed
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import (
     Line,
@@ -26,10 +25,12 @@ from estimator.physics.kernel.laws_at import (
     load_memory,
     motor_drag,
     motor_memory,
+    motor_sliding,
     moved_states,
     no_states,
     shaft_loss,
     shaft_memory,
+    spring_twist,
     state_rates,
 )
 from estimator.physics.kernel.sensing import entry
@@ -86,9 +87,7 @@ def motor_friction(speed: float, p: FloatArray, width: float, dry: float) -> flo
         friction += curve(speed, p, slots.TABLE_MOTOR_SPEED, False)[0]
     if every(dry == 0.0):
         return friction
-    coulomb, excess = p[slots.STRIBECK_COULOMB], p[slots.STRIBECK]
-    friction += dry_friction(speed, p[slots.COULOMB], width)
-    return friction + stribeck_law(speed, excess, coulomb, p[slots.STRIBECK_SPEED], width)
+    return friction + motor_sliding(speed, p) * smooth_sign(speed, width)
 
 
 @inlined
@@ -120,8 +119,7 @@ def shaft_torque(line: Line, twist: float, rate: float, now: Conditions, x: Stat
         loaded = beyond_gap(twist, p[slots.GAP])
         across = damping * p[slots.ACROSS]
         damping = (damping - across) * damping_share(loaded, p[slots.CONTACT])
-    law = p[slots.HARDENING], p[slots.SHAPE], p[slots.STAGE], p[slots.STAGE_FROM]
-    torque = float(now.stiffness * loaded_twist(loaded, *law)) + damping
+    torque = float(now.stiffness * spring_twist(loaded, p)) + damping
     if line.extended:
         torque += shaft_memory(loaded, rate, x.law_states, around(now), p)
     return held + (torque if closed else pressed(torque, loaded, p[slots.PULL]) + across)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 from estimator.compiled import inlined
-from estimator.lanes import every
-from estimator.physics.effects.sensor import resolver_error, resolver_slope, true_angle
+from estimator.physics.effects.sensor import resolver_error
 from estimator.physics.effects.timing import LowPass, filter_step
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.conditions import is_within
+from estimator.physics.kernel.laws_at import recorded, resolved
 from estimator.physics.kernel.state_vector import LOAD_ANGLE, LOAD_SPEED, SPEED, TWIST, State
 from estimator.signals.record import FloatArray
 
@@ -48,17 +46,6 @@ def read_angle(angle: float, p: FloatArray) -> float:
 
 
 @inlined
-def reading(speed: float, angle: float, p: FloatArray) -> float:
-    """Return the speed that the resolver gives [rad/s] where it gives an angle [rad]: a recording knows no other."""
-    once, twice = p[slots.RESOLVER_ONCE], p[slots.RESOLVER_TWICE]
-    if every(once == 0.0) and every(twice == 0.0):
-        return speed
-    phases = p[slots.RESOLVER_ONCE_PHASE], p[slots.RESOLVER_TWICE_PHASE]
-    true = true_angle(angle, once, phases[0], twice, phases[1])
-    return speed * resolver_slope(true, once, phases[0], twice, phases[1])
-
-
-@inlined
 def smoothed(
     before: State,
     after: State,
@@ -74,14 +61,11 @@ def smoothed(
     """Return the filtered reading and its rise [rad/s] after a step of ``h`` [s] between two states and read angles."""
     begin, end = entry(before, output, p), entry(after, output, p)
     bow = travelled(after, output, p) / h - travelled(before, output, p) / h - 0.5 * (begin + end)
-    read, ends = reading(begin + bow, angle_before, p), reading(end + bow, angle_after, p)
+    read, ends = resolved(begin + bow, angle_before, p), resolved(end + bow, angle_after, p)
     return filter_step(read, ends, filtered, rise, low, h)
 
 
 @inlined
 def shown(read: float, filtered: float, p: FloatArray) -> float:
-    """Return what is recorded of a reading: filtered, without its sign, quantised, as the sensor has it [rad/s]."""
-    value = filtered if p[slots.FILTER] > 0.0 else read
-    value += float(p[slots.BLIND]) * (abs(value) - value)
-    step = float(p[slots.QUANTISATION])
-    return step * math.floor(value / step + 0.5) if step > 0.0 else value
+    """Return what is recorded of a reading [rad/s]: filtered, and as the sensor has it."""
+    return recorded(filtered if p[slots.FILTER] > 0.0 else read, p)

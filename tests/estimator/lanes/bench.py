@@ -56,5 +56,21 @@ def of_five(function: Any, rows: Any, out: Any) -> None:
         to[i] = function(x[i], y[i], z[i], u[i], v[i])
 
 
-WAYS = (of_one, of_two, of_three, of_four, of_five)
+@numba.njit(error_model="numpy")
+def of_six(function: Any, rows: Any, out: Any) -> None:
+    to, x, y, z = as_lanes(out), as_lanes(rows[0]), as_lanes(rows[1]), as_lanes(rows[2])
+    u, v, w = as_lanes(rows[3]), as_lanes(rows[4]), as_lanes(rows[5])
+    for i in range(out.shape[0]):
+        to[i] = function(x[i], y[i], z[i], u[i], v[i], w[i])
+
+
+@numba.njit(error_model="numpy")
+def of_seven(function: Any, rows: Any, out: Any) -> None:
+    to, x, y, z = as_lanes(out), as_lanes(rows[0]), as_lanes(rows[1]), as_lanes(rows[2])
+    u, v, w, q = as_lanes(rows[3]), as_lanes(rows[4]), as_lanes(rows[5]), as_lanes(rows[6])
+    for i in range(out.shape[0]):
+        to[i] = function(x[i], y[i], z[i], u[i], v[i], w[i], q[i])
+
+
+WAYS = (of_one, of_two, of_three, of_four, of_five, of_six, of_seven)
 """Compiled code is given its arguments one by one."""

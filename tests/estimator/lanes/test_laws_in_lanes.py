@@ -12,10 +12,12 @@ from numba.core.unsafe import refcount
 from estimator.compiled import IS_COMPILED, compiled
 from estimator.lanes import borrowed
 from estimator.physics import laws
-from estimator.physics.effects.drag import cold_part, quadratic_law
-from estimator.physics.effects.dry_friction import stribeck_law
+from estimator.physics.effects.drag import quadratic_law, warming_law
+from estimator.physics.effects.dry_friction import brake_law, stribeck_law
+from estimator.physics.effects.inertia import coupled_law
 from estimator.physics.effects.load import carcass, coupling, gripped
-from estimator.physics.effects.shaft import damping_share, loading_rate, pressed, stiffness_factor
+from estimator.physics.effects.sensor import blind_law, resolver_law
+from estimator.physics.effects.shaft import cracked_law, damping_share, loading_rate, pressed, stiffness_factor
 from estimator.signals.record import FloatArray
 from tests.chosen import one_in
 from tests.estimator.lanes.bench import in_both_ways
@@ -47,12 +49,17 @@ LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
     (pressed, [EITHER_SIDE, EITHER_SIDE, (0.0, 0.5, 1.0)]),
     (loading_rate, [(-1.2, -0.5, 0.0, 0.9), EITHER_SIDE, (0.3, 2.0), (0.0, 0.8), (5.0, 600.0)]),
     (stiffness_factor, [EITHER_SIDE, (-2.0, 0.0, 30.0), (0.5, 1.0, 2.0)]),
-    (stribeck_law, [EITHER_SIDE, (0.0, 4.0), (3.0,), (0.0, 0.5, 2.0), (0.01, 0.5)]),
+    (stribeck_law, [EITHER_SIDE, (0.0, 4.0), (3.0,), (0.0, 0.5, 2.0), (0.0,), (0.0,)]),
+    (brake_law, [(0.0, 3.0), (0.1, 2.0), SIZES, (0.0,), (0.0,), (-1.0, 0.5), (0.6, 4.0)]),
     (carcass, [EITHER_SIDE, EITHER_SIDE, (3.0,), (0.2, 5.0)]),
     (gripped, [EITHER_SIDE, (2.0,), (0.0, 0.5)]),
     (_slope, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
     (_share, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
-    (cold_part, [(0.0, 3.0, 600.0), SIZES, (20.0, 300.0)]),
+    (warming_law, [(0.7,), (0.0, 3.0, 600.0), (0.01,), SIZES, (20.0, 300.0), (0.0, 0.4)]),
+    (coupled_law, [(1.0, 30.0), (0.0, 3.0), (0.1, 2.0), (0.0, 5.0), (-1.0, 0.5), (0.6, 4.0)]),
+    (cracked_law, [(900.0,), (0.0, 3.0), (0.1, 2.0), (-0.2, 0.0, 0.5), (-1.0, 0.5), (0.6, 4.0)]),
+    (resolver_law, [EITHER_SIDE, (0.3, 40.0), (0.0, 0.01), (0.0, 0.02), (0.4,), (-1.0,)]),
+    (blind_law, [EITHER_SIDE, (0.0, 0.4, 1.0)]),
 ]
 
 

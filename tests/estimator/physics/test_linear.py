@@ -102,7 +102,6 @@ def test_what_is_nonlinear_slips_or_drags_is_not_linear() -> None:
         ("quadratic_friction", "quadratic_nm_s2"),
         ("aerodynamic_drag", "drag_nm_s2"),
         ("stribeck_friction", "excess_nm"),
-        ("stribeck_friction", "coulomb_nm"),
         ("tyre_slip", "slip_per_nm"),
     ):
         curved = p.copy()

@@ -47,7 +47,7 @@ combined.__module__ = "estimator.for_a_test"  # where laws are
 
 
 def of_laws(speed: float, size: float) -> float:
-    friction = stribeck_law(speed, 3.0, size, 0.7, 0.01)
+    friction = stribeck_law(speed, 3.0, size, 0.7, 0.01, 0.0) * laws.smooth_sign(speed, 0.01)
     slope, share = coupling(speed, 1e-3, 0.5, 0.1, 40.0)
     low = low_pass(abs(size) + 1e-3, 0.3, 0.01)
     gap = laws.beyond_gap(speed, size)
