@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.inference.descent import covariance_of_innovations, fitted
+from estimator.diagnosis.inference.descent import WHOLE, Start, covariance_of_innovations, fitted
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs, of_spread
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, is_possible
@@ -252,8 +252,8 @@ def _from_its_moment(fits: Fits, hypothesis: Hypothesis) -> Hypothesis:
     if turned is hypothesis.result:
         return hypothesis
     initial = not_fitted(turned.problem, turned.x)
-    sizes, limits, before = hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log
-    found = fitted(hypothesis.effects, initial, sizes, limits, fits.catalogue, before)
+    start = Start(initial, hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log)
+    found = fitted(hypothesis.effects, start, WHOLE, fits.catalogue)
     return found if found.score <= hypothesis.score + Fitting.SETTLED_DEVIANCE else hypothesis
 
 
@@ -373,9 +373,8 @@ def _freed(fits: Fits, names: Collection[str], among: int) -> FreeLine | None:
         for s in shared
     )
     problem = replace(nothing.problem, shared=freed)
-    sizes = fits.nothing().sizes
-    initial = not_fitted(problem, nothing.x)
-    found = fitted(NOTHING, initial, sizes, fits.limits, fits.catalogue, fits.nothing().minus_twice_log)
+    start = Start(not_fitted(problem, nothing.x), fits.nothing().sizes, fits.limits, fits.nothing().minus_twice_log)
+    found = fitted(NOTHING, start, WHOLE, fits.catalogue)
     off_nominal = _off_nominal(fits, found, names)
     if not off_nominal:
         return None

@@ -52,55 +52,65 @@ class Effort:
     steps: int  # at most
 
 
-THOROUGH, ROUGH = Effort(derivatives=6, steps=30), Effort(derivatives=1, steps=6)
-"""What a pass may cost at most, and a first comparison."""
+THOROUGH = Effort(derivatives=6, steps=30)
+"""What a pass of a fit to its end may cost at most."""
 
 
-def fitted(
-    effects: Effects,
-    initial: FitResult,
-    sizes: FloatArray,
-    limits: Limits,
-    catalogue: Catalogue,
-    rival: float = math.nan,
-) -> Hypothesis:
-    """Fit a hypothesis from a free run and disturbances ``sizes``.
+@dataclass(frozen=True, slots=True)
+class Depth:
+    """How far a set is fitted: passes over its unknowns and its disturbances in turn."""
 
-    ``rival`` is minus twice the log-likelihood of the hypothesis it will be compared with: the farther from it, the
-    less the last digits matter. Without one it is fitted to its end.
-    """
-    result, sizes = initial, np.clip(sizes, limits.low, limits.high)
-    best, least, passes = (result, sizes), math.inf, 0
-    while passes < Fitting.MOST_PASSES:
-        result = descended(result, whitener_of(result, sizes), THOROUGH)
-        if passes < Fitting.WITH_MOMENTS:
-            result = _with_moments(result, sizes)
-        is_anew = passes == 0 and math.isnan(rival)  # with a rival they begin where its own ended
-        sizes, now = estimated(result, result.residual, sizes, limits, Fitting.ROUNDS, is_anew)
+    effort: Effort  # of the descent in each pass
+    passes: int  # at most
+    with_moments: int  # passes in which moments of events are looked for elsewhere
+    rounds: int  # of Fisher scoring, in which a pass estimates the disturbances
+    is_rough: bool = False  # whether it only has to be compared with others like it
+
+    def is_settled(self, before: float, now: float, samples: int, rival: float) -> bool:
+        """Tell whether minus twice the log-likelihood fell too little for another pass.
+
+        The farther a fit to its end is from what it will be compared with, the less its last digits matter.
+        """
+        if self.is_rough:
+            return now > before - Fitting.MUCH * samples
         digits = 0.0 if math.isnan(rival) else Fitting.DIGITS * abs(now - rival)
-        is_last = passes > 0 and now > least - max(Fitting.SETTLED_DEVIANCE, digits)
-        if passes == 0 or now < least:
+        return now > before - max(Fitting.SETTLED_DEVIANCE, digits)
+
+
+ROUGH = Depth(Effort(derivatives=1, steps=6), passes=Fitting.MOST_ROUGH, with_moments=0, rounds=1, is_rough=True)
+WHOLE = Depth(THOROUGH, passes=Fitting.MOST_PASSES, with_moments=Fitting.WITH_MOMENTS, rounds=Fitting.ROUNDS)
+"""A first comparison, and a fit that decides."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a fit of a set begins."""
+
+    initial: FitResult  # free run there, with what is known of its derivative
+    sizes: FloatArray  # of the disturbances
+    limits: Limits  # bounds of these
+    rival: float = math.nan
+    """Minus twice the log-likelihood of the set with which it will be compared; nan where there is none."""
+
+
+def fitted(effects: Effects, start: Start, depth: Depth, catalogue: Catalogue) -> Hypothesis:
+    """Fit a set of effects from a start: the best of some passes."""
+    result, sizes = start.initial, np.clip(start.sizes, start.limits.low, start.limits.high)
+    best, least, before = (result, sizes), math.inf, start.rival if depth.is_rough else math.inf
+    for done in range(depth.passes):
+        result = descended(result, whitener_of(result, sizes), depth.effort)
+        if done < depth.with_moments:
+            result = _with_moments(result, sizes)
+        is_anew = done == 0 and math.isnan(start.rival)  # with a rival they begin where its own ended
+        sizes, now = estimated(result, result.residual, sizes, start.limits, depth.rounds, is_anew)
+        if now < least:
             best, least = (result, sizes), now
-        if is_last:
+        if depth.is_settled(before, now, result.residual.size, start.rival):
             break
-        passes += 1
-    ended, sizes = without_derivative(best[0]), best[1]
-    return hypothesis_of(effects, ended, sizes, limits, least, catalogue)
-
-
-def compared(
-    effects: Effects, initial: FitResult, parent: Hypothesis, limits: Limits, catalogue: Catalogue
-) -> Hypothesis:
-    """Fit a hypothesis a few steps from another's disturbances, to be compared with others like it."""
-    result, now = initial, math.inf
-    sizes, best = np.clip(parent.sizes, limits.low, limits.high), parent.minus_twice_log
-    for _ in range(Fitting.MOST_ROUGH):
-        result = descended(result, whitener_of(result, sizes), ROUGH)
-        sizes, now = estimated(result, result.residual, sizes, limits, rounds=1)
-        if now > best - Fitting.MUCH * result.residual.size:
-            break
-        best = now
-    return hypothesis_of(effects, result, sizes, limits, now, catalogue)
+        before = least
+    result, sizes = best
+    ended = result if depth.is_rough else without_derivative(result)  # a rough fit may yet continue
+    return hypothesis_of(effects, ended, sizes, start.limits, least, catalogue)
 
 
 def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:

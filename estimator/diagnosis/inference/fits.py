@@ -14,7 +14,7 @@ from threading import Lock
 
 import numpy as np
 
-from estimator.diagnosis.inference.descent import compared, extended, fitted
+from estimator.diagnosis.inference.descent import ROUGH, WHOLE, Depth, Start, extended, fitted
 from estimator.diagnosis.inference.disturbances import Limits, limits_of
 from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, spans_of
 from estimator.diagnosis.inference.score_tests import Known, ScoredStart, WeightedScoreTests, promising
@@ -134,14 +134,24 @@ class Fits:
             self._done.add(key)
         return is_new
 
+    def fit(self, effects: Effects, starts: Sequence[Start], depth: Depth) -> Hypothesis:
+        """Fit a set from some starts and return the best; once more where its effects take a value off its sheet."""
+        found = [fitted(effects, start, depth, self.catalogue) for start in starts]
+        best = min([each for each in found if each.is_plausible] or found, key=lambda each: each.score)
+        loose = widened(best, self.model)
+        if loose is None:
+            return best
+        other = fitted(effects, replace(starts[0], initial=loose, sizes=best.sizes), depth, self.catalogue)
+        is_better = other.is_plausible and (other.score < best.score or not best.is_plausible)
+        return other if is_better else best
+
     def nothing(self) -> Hypothesis:
         """Return the fit of the nominal line alone."""
         if NOTHING not in self.ended:
             own = tuple(own_unknowns(self.model.effects, record) for record in self.records)
             problem = self._problem(NOTHING, Release(nominal_unknowns(self.model), own))
-            initial = not_fitted(problem, start_vector(problem))
-            found = fitted(NOTHING, initial, self.limits.usual, self.limits, self.catalogue)
-            self._keep(found, NOTHING)
+            start = Start(not_fitted(problem, start_vector(problem)), self.limits.usual, self.limits)
+            self._keep(self.fit(NOTHING, [start], WHOLE), NOTHING)
         return self.ended[NOTHING]
 
     def without(self, current: Hypothesis, name: str) -> Hypothesis:
@@ -152,9 +162,7 @@ class Fits:
         effects = current.effects - {name}
         if self.is_first("without", current.effects, name) or effects not in self.ended:
             result = self._reduced(current, name) if name != GRADE else current.result
-            limits = self.limits_of(effects)
-            whole = fitted(effects, result, current.sizes, limits, self.catalogue, current.minus_twice_log)
-            self._keep(whole, current.effects)
+            self._keep(self.fit(effects, [self._start(effects, result, current)], WHOLE), current.effects)
         return self.ended[effects]
 
     def exchanged(self, current: Hypothesis, name: str, other: str) -> Hypothesis | None:
@@ -179,15 +187,12 @@ class Fits:
         previous = current.result if is_again else rival.result
         for gone in rival.effects - effects - {GRADE}:
             previous = forgetting(previous, gone)
-        fits = []
+        known, begun = current.result if is_again else rival.result, []
         for scored in starts:
             problem = self._extended(previous, effects, inheriting(name, scored.release, previous))
-            initial = extended(problem, warm_start(problem, previous), current.result if is_again else rival.result)
-            fits.append(self._compared(effects, initial, rival))
-        best = min([each for each in fits if each.is_plausible] or fits, key=lambda each: each.score)
-        loose = widened(best, self.model)
-        if loose is not None:
-            best = self._more_plausible(best, self._compared(effects, loose, rival))
+            initial = extended(problem, warm_start(problem, previous), known)
+            begun.append(self._start(effects, initial, rival))
+        best = self.fit(effects, begun, ROUGH)
         is_case = best.is_plausible
         with self._lock:
             self.started_from.setdefault(effects, rival.effects)
@@ -197,9 +202,9 @@ class Fits:
                 self.rough[effects] = best
         return best if is_case else None
 
-    def rewritten(self, current: Hypothesis, name: str) -> list[Hypothesis]:
-        """Fit a set a few steps with one of its laws written other ways."""
-        fits, result = [], current.result
+    def rewritten(self, current: Hypothesis, name: str) -> Hypothesis | None:
+        """Fit a set a few steps with one of its laws written other ways; None where it has no other one."""
+        starts, result = [], current.result
         for other in EFFECTS[name].reparametrised(
             self.model, self.records, result.values_of(name), line_values(result)
         ):
@@ -207,8 +212,8 @@ class Fits:
             (release,) = released(name, self.model, self.records, [other.start])
             problem = self._extended(initial, current.effects, replace(release, own=((),) * len(self.records)))
             started = extended(problem, warm_start(problem, initial), result, anew=name)
-            fits.append(self._compared(current.effects, started, current))
-        return fits
+            starts.append(self._start(current.effects, started, current))
+        return self.fit(current.effects, starts, ROUGH) if starts else None
 
     def elsewhere(self, current: Hypothesis, name: str) -> Hypothesis | None:
         """Fit an event a few steps where a look at the set without it, the rest as it is, sees it."""
@@ -233,10 +238,8 @@ class Fits:
         One that is worse than what is known of its set may yet end elsewhere: a few steps do not tell.
         """
         if self.ended.get(rough.effects) is not rough:
-            whole = self._fitted(rough, rough.result, rival)
-            loose = widened(whole, self.model)
-            if loose is not None:
-                whole = self._more_plausible(whole, self._fitted(whole, loose, rival))
+            start = Start(rough.result, rough.sizes, rough.limits, rival.minus_twice_log)
+            whole = self.fit(rough.effects, [start], WHOLE)
             self._keep(whole if whole.is_plausible else rough, rival.effects)
         return self.ended[rough.effects]
 
@@ -266,15 +269,9 @@ class Fits:
         problem = self._problem(effects, unknowns_of(result, (effects - {GRADE}) | set(self.model.effects)))
         return extended(problem, warm_start(problem, forgetting(result, name)), result)
 
-    def _compared(self, effects: Effects, initial: FitResult, rival: Hypothesis) -> Hypothesis:
-        return compared(effects, initial, rival, self.limits_of(effects), self.catalogue)
-
-    def _fitted(self, of: Hypothesis, initial: FitResult, rival: Hypothesis) -> Hypothesis:
-        return fitted(of.effects, initial, of.sizes, of.limits, self.catalogue, rival.minus_twice_log)
-
-    def _more_plausible(self, one: Hypothesis, other: Hypothesis) -> Hypothesis:
-        """Return the better of two fits of a set, where both are plausible; else the one that is."""
-        return other if other.is_plausible and (other.score < one.score or not one.is_plausible) else one
+    def _start(self, effects: Effects, initial: FitResult, rival: Hypothesis) -> Start:
+        """Return a start of a set with the disturbances of the one that it will be compared with."""
+        return Start(initial, rival.sizes, self.limits_of(effects), rival.minus_twice_log)
 
     def _extended(self, previous: FitResult, effects: Effects, release: Release) -> Problem:
         common = unknowns_of(previous, (effects - {GRADE}) | set(self.model.effects))

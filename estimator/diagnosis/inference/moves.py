@@ -94,7 +94,7 @@ def begun_elsewhere(fits: Fits, current: Hypothesis) -> list[Hypothesis]:
     found: list[Hypothesis | None] = []
     for name in sorted(current.effects - {GRADE}):
         if fits.is_first("started elsewhere", current.effects, name):
-            found += fits.rewritten(current, name)
+            found.append(fits.rewritten(current, name))
             if EFFECTS[name].event:
                 found.append(fits.elsewhere(current, name))
     better = [each for each in found if each is not None and each.is_plausible]
