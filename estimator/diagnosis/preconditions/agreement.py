@@ -100,7 +100,7 @@ def _own_line(record: Record, model: DrivelineModel) -> Mapping[str, Uncertain] 
             is_linear = judge_linearity(problem, x, first_part(record), first, HIGH_PASS_HZ).is_linear
             if not (is_linear and validate(fit, data).independence.is_independent):
                 return None
-            drive = physical_parameters(fit.model, fit.covariance)
+            drive = physical_parameters(fit.model, fit.covariance, names=COMPARED)
     except EstimatorError:
         return None
     return {name: drive.parameters[name].estimate for name in COMPARED}

@@ -22,7 +22,7 @@ They end at 0 where the data allow it, and reach as far up as the data do: no no
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -254,9 +254,15 @@ class _Held:
 
 
 def physical_parameters(
-    model: LinearModel, covariance: FloatArray, known: Mapping[str, Uncertain] | None = None
+    model: LinearModel,
+    covariance: FloatArray,
+    known: Mapping[str, Uncertain] | None = None,
+    names: Collection[str] = (*NAMES, *SUMS),
 ) -> PhysicalEstimate:
-    """Estimate the two-mass drive behind a linear model from motor torque to motor speed."""
+    """Estimate the two-mass drive behind a linear model from motor torque to motor speed.
+
+    Returned are the parameters and sums of these ``names``: an interval is some twenty constrained fits.
+    """
     prior = _checked(model, covariance, known or {})
     start = two_mass_start(model)
     variances, axes = np.linalg.eigh(covariance)
@@ -278,7 +284,7 @@ def physical_parameters(
             "mass or a gap look like this; see the residual tests, check the sign and scale of torque and speed, or "
             "diagnose the recording."
         )
-    return _estimate(likelihood, z, misfit)
+    return _estimate(likelihood, z, misfit, names)
 
 
 def _checked(model: LinearModel, covariance: FloatArray, known: Mapping[str, Uncertain]) -> dict[int, Uncertain]:
@@ -296,7 +302,7 @@ def _checked(model: LinearModel, covariance: FloatArray, known: Mapping[str, Unc
     return {NAMES.index(name): value for name, value in known.items()}
 
 
-def _estimate(likelihood: _Likelihood, z: FloatArray, misfit: float) -> PhysicalEstimate:
+def _estimate(likelihood: _Likelihood, z: FloatArray, misfit: float, names: Collection[str]) -> PhysicalEstimate:
     x, (_, J) = likelihood.parameters(z), likelihood.linearised(z)
     spread = np.linalg.pinv(J.T @ J, hermitian=True)
 
@@ -308,8 +314,8 @@ def _estimate(likelihood: _Likelihood, z: FloatArray, misfit: float) -> Physical
         std = (high - low) / (2.0 * QUANTILE)
         return _parameter(name, UNITS[NAMES[places[0]]], Uncertain(value, std, (low, high)), CURES[NAMES[places[-1]]])
 
-    parameters = {name: quantity(name, (i,)) for i, name in enumerate(NAMES)}
-    sums = {name: quantity(name, places) for name, places in SUMS.items()}
+    parameters = {name: quantity(name, (i,)) for i, name in enumerate(NAMES) if name in names}
+    sums = {name: quantity(name, places) for name, places in SUMS.items() if name in names}
     return PhysicalEstimate(MappingProxyType(parameters), MappingProxyType(sums), misfit)
 
 

@@ -10,9 +10,10 @@ import pytest
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
 from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.driveline import InitialCondition
+from estimator.physics.driveline import InitialCondition, Structure
 from estimator.physics.effect import Effect, Element, Held, Place
 from estimator.physics.kernel import slots
+from estimator.physics.kernel.laws_at import GIVEN
 from estimator.physics.layout import flat, flat_values, grid_for, slot
 from estimator.physics.simulate import simulate
 from estimator.signals.record import FloatArray, OutputKind, Record
@@ -174,6 +175,38 @@ def test_a_law_has_a_state_where_its_place_has_laws_with_one(entry: Effect) -> N
     if entry.acting is not None:
         allowed = {Place.SHAFT: (True,), Place.MOTOR: (True, False), Place.LOAD: (True, False)}
         assert (entry.acting.rate is not None) in allowed.get(entry.acting.place, (False,))
+
+
+CHANGING = {
+    **dict.fromkeys(
+        (Place.MOTOR_INERTIA, Place.LOAD_INERTIA, Place.STIFFNESS, Place.LOAD_DAMPING, Place.LOAD_DRY), "time_s"
+    ),
+    **dict.fromkeys((Place.DRIVE_ANGLE, Place.JOINT, Place.RECORDED_ANGLE), "angle"),
+}
+"""What a law is given that changes during a recording, at places whose laws are not worked out at every step."""
+
+
+@released
+def test_a_law_that_changes_all_the_time_is_worked_out_at_every_step(entry: Effect, reversal: Record) -> None:
+    if entry.acting is None or entry.acting.place not in CHANGING:
+        return
+    given, changing = GIVEN[entry.acting.place], CHANGING[entry.acting.place]
+    for start in start_values(entry, [reversal]):
+        values = {each.name: each.null for each in entry.parameters} | start
+        early, late = (
+            entry.acting.law(*(moment if each == changing else 0.7 for each in given), *values.values())
+            for moment in (0.4, 2.9)
+        )
+        assert entry.waving or entry.event or early == late, (
+            f"{entry.name} needs waving=True: it changes with {changing}"
+        )
+
+
+@entries
+def test_a_law_acts_in_every_structure_that_it_names(entry: Effect) -> None:
+    """A joint on a bench has a simulation of its own (estimator/physics/joint.py)."""
+    if Structure.JOINT in entry.structures and entry.acting is not None and entry.name != "shaft_hysteresis":
+        assert entry.acting.place in (Place.STIFFNESS, Place.SPRING), f"{entry.name} does nothing in a joint"
 
 
 @entries

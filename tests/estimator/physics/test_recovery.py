@@ -201,7 +201,7 @@ def test_the_fit_finds_what_was_planted(case: str) -> None:
         if unknown.low == unknown.high or unknown.name in plant.undetermined:
             continue
         found, sigma = result.x[i] * unknown.scale, errors[i] * unknown.scale
-        assert abs(found - wanted[unknown.effect, unknown.name]) < 4.5 * sigma + 1e-9
+        assert abs(found - wanted[unknown.effect, unknown.name]) < 4.5 * sigma + 1e-9, unknown.name
     decisive = next(i for i, s in enumerate(result.problem.shared) if s.effect == name and s.low < s.high)
     null = next(p.null for p in EFFECTS[name].parameters if p.name == result.problem.shared[decisive].name)
     if np.isfinite(null):
