@@ -308,7 +308,7 @@ class Fitting:
     SETTLED_DEVIANCE = 1.0
     DIGITS = 0.02  # the same over the difference from a rival that the fit is for
     MOST_PASSES = 6  # over unknowns and disturbances in turn
-    # Rough comparisons under disturbances of their own at most, and the fall of minus twice the log-likelihood per
+    # Passes of a rough fit at most, and the fall of minus twice the log-likelihood per
     # sample for the next
     MOST_ROUGH, MUCH = 3, 0.05
     ROUNDS = 2  # steps of Fisher scoring in a pass

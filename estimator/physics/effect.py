@@ -1,8 +1,9 @@
 """What an entry of the catalogue is: a law that can be released from its null, and what is known of it.
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
-that acts at a `Place` is taken into the one kernel from its entry. Written into the kernel is only what gives the line
-another mass, has faces that meet, or comes between the samples. Everything else about it stands in its entry.
+that acts at a `Place` is taken into the one kernel from its entry. Written into the kernel is what gives the line
+another mass, has faces that meet, or comes between the samples, and how dry friction is near rest; next to it, what
+each inverter's torque is. Everything else about a law stands in its entry.
 """
 
 from __future__ import annotations
@@ -28,27 +29,28 @@ WITH_SPRING = WITH_SHAFT | {Structure.JOINT}  # structures with a shaft, between
 class Place(Enum):
     """Where a law acts, and so what it is given before its parameters, and what it returns.
 
-    All but those of the recorded torque are compiled: for one simulation and for several side by side
-    (``estimator.lanes``). Where several laws act at one place their torques add up; a law that is given a value of the
-    line, a twist or a reading returns what it makes of it, and the next one takes that.
+    All but those of the recorded torque are compiled: for one simulation and, but for `SENSOR`, for several side by
+    side (``estimator.lanes``). Where several laws act at one place their torques add up; a law that is given a value of
+    the line, a twist or a reading returns what it makes of it, and the next one takes that. Torques in Nm, angles in
+    rad, speeds in rad/s; a time is that since the start at which a step begins, and a length the step's [s].
     """
 
-    TORQUE = "torque"  # recorded torque, time since the start, (N,) each -> torque that acts
-    DRIVE_ANGLE = "drive_angle"  # angle of the motor -> torque at the motor, share of the drive's own torque
+    TORQUE = "torque"  # recorded torque and time since the start, (N,) each -> torque that acts
+    DRIVE_ANGLE = "drive_angle"  # recorded angle of the motor -> torque at the motor, share of the drive's own torque
     MOTOR = "motor"  # speed -> torque against the motion
-    MOTOR_DRY = "motor_dry"  # speed -> size of a dry friction that slides
-    MOTOR_INERTIA = "motor_inertia"  # inertia, time since the start, length of the step -> inertia
-    JOINT = "joint"  # angle of the motor -> torque, share of the shaft's own, angle, rate of the angle over the motor's
-    STIFFNESS = "stiffness"  # stiffness of the shaft, time since the start, length of the step -> stiffness
-    SPRING = "spring"  # twist of the shaft -> twist at which a linear spring carries the same torque
+    MOTOR_DRY = "motor_dry"  # speed -> size of a dry friction that slides: even in the speed, largest at rest
+    MOTOR_INERTIA = "motor_inertia"  # inertia [kg m^2], time, length -> inertia
+    CARDAN = "cardan"  # recorded angle of the motor -> torque, share of the shaft's, imposed angle, its slope [rad/rad]
+    STIFFNESS = "stiffness"  # stiffness of the first shaft [Nm/rad], time, length -> stiffness
+    SPRING = "spring"  # twist of the first shaft -> twist at which a linear spring carries the same torque
     SHAFT = "shaft"  # twist, its rate -> torque; its laws have a state
     SHAFT_LOSS = "shaft_loss"  # torque of the shaft, direction of the motion -> torque that is lost
     LOAD = "load"  # speed -> torque against the motion
-    LOAD_DRY = "load_dry"  # time since the start, length of the step -> size of a dry friction
-    LOAD_DAMPING = "load_damping"  # viscous friction, time since the start, length of the step -> viscous friction
-    LOAD_INERTIA = "load_inertia"  # inertia, time since the start, length of the step -> inertia
+    LOAD_DRY = "load_dry"  # time, length -> size of a dry friction
+    LOAD_DAMPING = "load_damping"  # viscous friction [Nm s/rad], time, length -> viscous friction
+    LOAD_INERTIA = "load_inertia"  # inertia of the load, or of a line of one mass [kg m^2], time, length -> inertia
     LOAD_ANGLE = "load_angle"  # angle of the load -> torque against it
-    RECORDED_ANGLE = "recorded_angle"  # angle of the motor as it was recorded -> torque against the load
+    RECORDED_ANGLE = "recorded_angle"  # recorded angle of the motor -> torque against the load
     RESOLVER = "resolver"  # speed, angle that is read -> speed that is read
     SENSOR = "sensor"  # reading -> what is recorded of it
 
@@ -197,7 +199,7 @@ class Effect:
     law: str  # the equation, as text
     source: str  # where the law is from
     excited_by: str  # what a test must do to show it
-    parameters: tuple[EffectParameter, ...]  # in the order in which the law takes them; the first one is the size
+    parameters: tuple[EffectParameter, ...]  # in the order in which the law takes them; the first is a size
     structures: frozenset[Structure]  # where it makes sense
     resembles: tuple[str, ...]  # rivals that look alike in part
     text: str | Callable[[Mapping[str, float], Motion], str]  # the statement a driveline engineer would write

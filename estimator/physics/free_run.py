@@ -125,9 +125,7 @@ def _with_own(problem: Problem, known: Own) -> FloatArray:
 
 def _sizes(p: FloatArray, name: str) -> dict[str, float]:
     """Return the sizes of an effect whose phases or moments are sought: its amplitudes, or what an event changes."""
-    entry = EFFECTS[name]
-    names = list(entry.phases.values()) if entry.phases else [entry.shared_parameters[0].name]
-    return {parameter: float(p[slot(name, parameter)]) for parameter in names}
+    return {parameter: float(p[slot(name, parameter)]) for parameter in EFFECTS[name].sizes}
 
 
 def simulate_foreign(

@@ -17,7 +17,7 @@ from estimator.physics.effect import Place
 from estimator.physics.effects.torque import EDGE
 from estimator.physics.kernel import conditions, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
-from estimator.physics.kernel.laws_at import load_sliding, motor_sliding, resolved
+from estimator.physics.kernel.laws_at import load_lasting, motor_sliding, resolved
 from estimator.physics.layout import LOAD, slot
 from estimator.signals.record import MOST_BYTES, FloatArray, IntArray, Record, once
 
@@ -42,8 +42,6 @@ _WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _D
 _TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
 _PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places), *_TABLE])
 """Where all stands that ``shaft_torque`` depends on."""
-
-MOMENT_S = 1e-9  # how long a start takes: shorter than any period
 
 MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
 
@@ -252,4 +250,4 @@ def follow(x: FloatArray, torque_nm: float, angle_rad: float, p: FloatArray) -> 
     if is_bristled(p):  # of friction that has slid for long
         x[state_vector.BRISTLES_MOTOR] = conditions.slid(speed, motor_sliding(speed, p))
         loaded = carried if p[slots.J_L] > 0.0 else speed
-        x[state_vector.BRISTLES_LOAD] = conditions.slid(loaded, load_sliding(0.0, MOMENT_S, p))
+        x[state_vector.BRISTLES_LOAD] = conditions.slid(loaded, load_lasting(0.0, 1.0, p))

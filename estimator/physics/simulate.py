@@ -18,7 +18,6 @@ from estimator.physics.effects.timing import TRANSPORT_DELAY
 from estimator.physics.inputs import initial_state, inputs_of, load_of, shaft_torque_from
 from estimator.physics.kernel import integration, sensing, side_by_side, state_vector
 from estimator.physics.kernel.integration import Masses
-from estimator.physics.kernel.laws_at import resolved
 from estimator.physics.layout import OBSERVER, Grid, flat, slot, substeps_for
 from estimator.physics.model import DrivelineModel, Structure
 from estimator.physics.motion import motor_angle
@@ -374,8 +373,8 @@ class Stepper:
     def speed_rad_s(self) -> float:
         """Motor speed now, as the sensor shows it [rad/s]."""
         state = self._state
-        read = resolved(state[state_vector.SPEED], self._read_angle(), self._p)
-        return float(sensing.shown(read, state[state_vector.FILTERED], self._p))
+        speed, filtered = state[state_vector.SPEED], state[state_vector.FILTERED]
+        return float(sensing.shown(speed, self._read_angle(), filtered, self._p))
 
     @property
     def angle_rad(self) -> float:

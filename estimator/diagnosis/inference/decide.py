@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from estimator.diagnosis.acquisition.chain import Chain
-from estimator.diagnosis.inference.descent import WHOLE, Start, covariance_of_innovations, fitted
+from estimator.diagnosis.inference.descent import WHOLE, Start, covariance_of_innovations
 from estimator.diagnosis.inference.figures import FreeRuns, Unseen, acquired, figures_of, free_runs, of_spread
 from estimator.diagnosis.inference.fits import Fits
 from estimator.diagnosis.inference.hypotheses import GRADE, NOTHING, Catalogue, Effects, Hypothesis, is_possible
@@ -253,7 +253,7 @@ def _from_its_moment(fits: Fits, hypothesis: Hypothesis) -> Hypothesis:
         return hypothesis
     initial = not_fitted(turned.problem, turned.x)
     start = Start(initial, hypothesis.sizes, hypothesis.limits, hypothesis.minus_twice_log)
-    found = fitted(hypothesis.effects, start, WHOLE, fits.catalogue)
+    found = fits.fit(hypothesis.effects, [start], WHOLE)
     return found if found.score <= hypothesis.score + Fitting.SETTLED_DEVIANCE else hypothesis
 
 
@@ -374,7 +374,7 @@ def _freed(fits: Fits, names: Collection[str], among: int) -> FreeLine | None:
     )
     problem = replace(nothing.problem, shared=freed)
     start = Start(not_fitted(problem, nothing.x), fits.nothing().sizes, fits.limits, fits.nothing().minus_twice_log)
-    found = fitted(NOTHING, start, WHOLE, fits.catalogue)
+    found = fits.fit(NOTHING, [start], WHOLE)
     off_nominal = _off_nominal(fits, found, names)
     if not off_nominal:
         return None

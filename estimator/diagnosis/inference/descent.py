@@ -100,7 +100,7 @@ def fitted(effects: Effects, start: Start, depth: Depth, catalogue: Catalogue) -
     for done in range(depth.passes):
         result = descended(result, whitener_of(result, sizes), depth.effort)
         if done < depth.with_moments:
-            result = _with_moments(result, sizes)
+            result = _with_moments(result, sizes, depth.effort)
         is_anew = done == 0 and math.isnan(start.rival)  # with a rival they begin where its own ended
         sizes, now = estimated(result, result.residual, sizes, start.limits, depth.rounds, is_anew)
         if now < least:
@@ -113,7 +113,7 @@ def fitted(effects: Effects, start: Start, depth: Depth, catalogue: Catalogue) -
     return hypothesis_of(effects, ended, sizes, start.limits, least, catalogue)
 
 
-def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
+def _with_moments(result: FitResult, sizes: FloatArray, effort: Effort) -> FitResult:
     """Return a fit with moments of events where the innovations are least, and fitted from there."""
     if not has_moments(result.problem):
         return result
@@ -121,7 +121,7 @@ def _with_moments(result: FitResult, sizes: FloatArray) -> FitResult:
         found = with_better_moments(result, whitener_of(result, sizes))
         if found is None:
             break
-        result = descended(extended(*found, result), whitener_of(result, sizes), THOROUGH)
+        result = descended(extended(*found, result), whitener_of(result, sizes), effort)
     return result
 
 

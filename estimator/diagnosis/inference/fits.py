@@ -184,10 +184,10 @@ class Fits:
         if effects in self.ended and not is_again:
             return self.ended[effects]
         rival = instead or current
-        previous = current.result if is_again else rival.result
+        known = previous = current.result if is_again else rival.result
         for gone in rival.effects - effects - {GRADE}:
             previous = forgetting(previous, gone)
-        known, begun = current.result if is_again else rival.result, []
+        begun: list[Start] = []
         for scored in starts:
             problem = self._extended(previous, effects, inheriting(name, scored.release, previous))
             initial = extended(problem, warm_start(problem, previous), known)

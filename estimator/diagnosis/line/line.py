@@ -12,7 +12,12 @@ from scipy.linalg import expm
 from estimator.compiled import compiled
 from estimator.physics.fit import FitResult
 from estimator.physics.kernel import slots, state_vector
-from estimator.physics.kernel.laws_at import load_rubs, load_sliding, motor_rubs, motor_sliding
+from estimator.physics.kernel.laws_at import (
+    has_dry_friction_at_load,
+    has_dry_friction_at_motor,
+    load_sliding,
+    motor_sliding,
+)
 from estimator.physics.layout import slot
 from estimator.physics.model import Structure
 from estimator.physics.motion import motor_angle
@@ -181,9 +186,10 @@ def _of_laws(result: FitResult, index: int, change_of: Callable[[FloatArray], Fl
     structure = result.problem.grid.structure
     if structure is Structure.JOINT or result.problem.grid.plant is not None:
         return found
-    if motor_rubs(p):
+    motor, load = _has_dry_friction(p)
+    if motor:
         found[FormPlace.MOTOR] = change_of(_at_motor(simulated(result, index, state=state_vector.SPEED), p))
-    if load_rubs(p):
+    if load:
         state = state_vector.SPEED if structure is Structure.ONE_MASS else state_vector.LOAD_SPEED
         found[FormPlace.LOAD] = change_of(
             _at_load(simulated(result, index, state=state), record.since_start_s, record.sample_time_s, p)
@@ -191,6 +197,11 @@ def _of_laws(result: FitResult, index: int, change_of: Callable[[FloatArray], Fl
     if p[[slots.GAP, _STAGE]].any():
         found[FormPlace.SHAFT] = change_of(_in_shaft(simulated(result, index, state=state_vector.TWIST), p))
     return np.where(np.isfinite(found), found, 0.0)
+
+
+@compiled
+def _has_dry_friction(p: FloatArray) -> tuple[bool, bool]:
+    return has_dry_friction_at_motor(p), has_dry_friction_at_load(p)
 
 
 @compiled
@@ -205,7 +216,8 @@ def _at_motor(speed: FloatArray, p: FloatArray) -> FloatArray:
 def _at_load(speed: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray) -> FloatArray:
     torque = np.empty_like(speed)
     for k in range(speed.size):
-        torque[k] = load_sliding(since_start_s[k], period_s, p) * np.sign(speed[k])
+        period = since_start_s[min(k, speed.size - 2)]  # behind the last sample there is none
+        torque[k] = load_sliding(period, period_s, p) * np.sign(speed[k])
     return torque
 
 

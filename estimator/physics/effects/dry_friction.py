@@ -59,7 +59,7 @@ LOAD_PRESLIDING = EffectParameter(
 
 @compiled
 def coulomb_law(speed: float, friction: float, presliding: float, creep: float) -> float:
-    """Return ``T_c``, the friction torque while it slides."""
+    """Return ``T_c``, the friction torque while it slides [Nm]."""
     return friction
 
 
@@ -124,7 +124,7 @@ COULOMB_FRICTION_MOTOR = Effect(
 
 @compiled
 def load_coulomb_law(time_s: float, length_s: float, friction: float, presliding: float, creep: float) -> float:
-    """Return ``T_c``, the friction torque while it slides."""
+    """Return ``T_c``, the friction torque while it slides [Nm]."""
     return friction
 
 
@@ -182,7 +182,7 @@ COULOMB_FRICTION_LOAD = Effect(
 def stribeck_law(
     speed: float, excess: float, coulomb: float, stribeck_speed: float, presliding: float, creep: float
 ) -> float:
-    """Return ``T_c + T_x exp(-(w/w_s)^2)``, the friction torque while it slides."""
+    """Return ``T_c + T_x exp(-(w/w_s)^2)``, the friction torque while it slides [Nm]."""
     if every(excess == 0.0):
         return coulomb
     ratio = speed / max(stribeck_speed, LEAST)

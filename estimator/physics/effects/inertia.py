@@ -51,7 +51,7 @@ ABOVE = 5.0  # frequency over the line's own near which it is looked for where t
 
 
 @compiled
-def coupled_law(inertia: float, time_s: float, length_s: float, extra: float, from_s: float, to_s: float) -> float:
+def with_more_law(inertia: float, time_s: float, length_s: float, extra: float, from_s: float, to_s: float) -> float:
     """Return an inertia with another one on it from one moment to the next [kg m^2]."""
     return inertia_while(inertia, extra, share_inside(time_s, length_s, from_s, to_s))
 
@@ -67,7 +67,7 @@ GENERATOR_COUPLED = Effect(
         EffectParameter("inertia_kg_m2", "inertia", 0.0, 0.0, 20.0, "inertia that is coupled: J_G"),
         *MOMENTS,
     ),
-    acting=Acting(Place.MOTOR_INERTIA, coupled_law),
+    acting=Acting(Place.MOTOR_INERTIA, with_more_law),
     structures=EVERY_LINE,
     resembles=("stiffness_change", "brake_drag", "inertia_change"),
     event=True,
@@ -101,7 +101,7 @@ INERTIA_CHANGE = Effect(
         EffectParameter("change_kg_m2", "inertia", 0.0, -7.0, 40.0, "change of the inertia: delta"),
         *MOMENTS,
     ),
-    acting=Acting(Place.LOAD_INERTIA, coupled_law),
+    acting=Acting(Place.LOAD_INERTIA, with_more_law),
     structures=EVERY_LINE,
     resembles=("generator_coupled", "road_grade"),
     event=True,

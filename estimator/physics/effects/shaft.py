@@ -399,7 +399,7 @@ VISCOELASTIC_SHAFT = Effect(
 def cardan_law(
     angle: float, torque: float, imposed: float, share: float, phase: float, imposed_phase: float, share_phase: float
 ) -> tuple[float, float, float, float]:
-    """Return the torque that the joints add [Nm], its share of the shaft's, the angle that they impose, its slope."""
+    """Return the torque that the joints add [Nm], a share of the shaft's, the angle they impose [rad], its slope."""
     twice = 2.0 * angle
     return (
         wave(torque, twice, phase),
@@ -456,7 +456,7 @@ CARDAN_SECOND_ORDER = Effect(
         EffectParameter("angle_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of a, of each recording", True, True),
         EffectParameter("share_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of r, of each recording", True, True),
     ),
-    acting=Acting(Place.JOINT, cardan_law),
+    acting=Acting(Place.CARDAN, cardan_law),
     structures=WITH_SHAFT,
     resembles=("torque_ripple", "load_imbalance", "resolver_error"),
     phases={"phase_rad": "amplitude_nm", "angle_phase_rad": "angle_rad", "share_phase_rad": "share"},

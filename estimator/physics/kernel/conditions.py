@@ -14,20 +14,20 @@ from estimator.physics.curve import curve, wrapped
 from estimator.physics.effects.inertia import frequency_within
 from estimator.physics.kernel import slots
 from estimator.physics.kernel.laws_at import (
-    has_law_in_shaft,
     has_states,
-    in_joint,
+    in_cardan,
+    is_shaft_bent,
     load_creep,
     load_damping,
     load_inertia,
+    load_over_angle,
     load_presliding,
     load_sliding,
     motor_creep,
     motor_inertia,
     motor_presliding,
     motor_sliding,
-    over_motor_angle,
-    over_recorded_angle,
+    rippled,
     shaft_stiffness,
 )
 from estimator.physics.kernel.state_vector import Bristles, Conditions, State, Tyre
@@ -60,7 +60,7 @@ class Line(NamedTuple):
 @inlined
 def is_elastic(p: FloatArray) -> bool:
     """Tell whether the first shaft is a spring and a damper, and no law next to them."""
-    return not (has_law_in_shaft(p) or p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0)
+    return not (is_shaft_bent(p) or p[slots.TABLE_TWIST] > 0.0 or p[slots.TABLE_RATE] > 0.0)
 
 
 @inlined
@@ -135,16 +135,17 @@ def conditions(
     masses: int, time_s: float, h: float, angle: float, load: float, sign_width: float, p: FloatArray
 ) -> Conditions:
     """Return what holds during the sub-step of length ``h`` [s] from ``time_s`` on, at a motor angle [rad]."""
-    torque, torque_share = over_motor_angle(angle, p)
-    shaft, shaft_share, joint_angle, joint_rate = in_joint(angle, p)
+    torque, torque_share = rippled(angle, p)
+    shaft, shaft_share, joint_angle, joint_rate = in_cardan(angle, p)
     if some(p[slots.TABLE_ANGLE] > 0.0):
         load += curve(wrapped(angle + p[slots.TABLE_PHASE], p, slots.TABLE_ANGLE), p, slots.TABLE_ANGLE, True)[0]
-    load += over_recorded_angle(angle, p)
+    load += load_over_angle(angle, p)
     inertia_motor = motor_inertia(p[slots.J_M], time_s, h, p)
     inertia_load = load_inertia(p[slots.J_L], time_s, h, p) if masses > 1 else 0.0
     if masses == 1:
         inertia_motor = load_inertia(inertia_motor, time_s, h, p)
-    dry_motor, dry_load = breakaway(p), load_sliding(time_s, h, p)
+    rest = broadcast_as(0.0, p[slots.J_M])  # a speed of 0, of as many lines as there are parameters
+    dry_motor, dry_load = motor_sliding(rest, p), load_sliding(time_s, h, p)
     wheel_inertia = choose(p[slots.SLIP] > 0.0, p[slots.SLIP_WHEEL] * inertia_load, inertia_load)
     carried = inertia_motor if masses == 1 else wheel_inertia
     fastest = STICK_STABILITY / h
@@ -249,12 +250,6 @@ def with_torque(now: Conditions, torque: float) -> Conditions:
 
 
 @inlined
-def breakaway(p: FloatArray) -> float:
-    """Return the dry friction of all laws at the motor, next to standstill [Nm]."""
-    return motor_sliding(broadcast_as(0.0, p[slots.J_M]), p)
-
-
-@inlined
 def slid(speed: float, limit: float) -> float:
     """Return the torque against a motion that has continued for long under a friction [Nm]."""
     return choose(speed > 0.0, limit, choose(speed < 0.0, -limit, 0.0))
@@ -270,7 +265,7 @@ def followed(torque: float, speed: float, limit: float, stiffness: float, time_s
 @inlined
 def at_motor(torque: float, x: State, now: Conditions, p: FloatArray, time_s: float) -> float:
     """Return the torque of the motor's bristles after a time at the speed of a state [Nm]."""
-    stiff = breakaway(p) / motor_presliding(p)
+    stiff = now.dry_motor / motor_presliding(p)
     stiff = min(stiff, now.fastest * now.fastest / now.inverse_motor)
     return followed(torque, x.speed, motor_sliding(x.speed, p), stiff, time_s)
 

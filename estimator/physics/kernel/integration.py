@@ -25,7 +25,7 @@ from estimator.physics.kernel.conditions import (
     rubbed,
     with_torques,
 )
-from estimator.physics.kernel.laws_at import resolved, waves
+from estimator.physics.kernel.laws_at import is_waving
 from estimator.physics.kernel.linear import (
     WORTHWHILE_SAMPLES,
     StepResponses,
@@ -236,7 +236,7 @@ def integrate_made(  # one question more than usual, and a change costs each use
     length = 1.0 / substeps
     feed = feed_from(torque, start_s / sample_time_s, sample_time_s, p, h)
     low = low_pass(p[slots.FILTER], p[slots.FILTER_SHAPE], h)
-    waving, filtering = waves(p), p[slots.FILTER] > 0.0
+    waving, filtering = is_waving(p), p[slots.FILTER] > 0.0
     steep, following = slopes.shape[1] > 0, followed.shape[0] > 0
     slope = slope_before(first, slopes)
     output = outputs[0]
@@ -253,7 +253,7 @@ def integrate_made(  # one question more than usual, and a change costs each use
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         for i in range(outputs.shape[0]):
             value = read_out(line, now, x, outputs[i], p)
-            out[i, k] = shown(resolved(value, angle[k], p), filtered, p) if sensor and i == 0 else value
+            out[i, k] = shown(value, angle[k], filtered, p) if sensor and i == 0 else value
         leave_slope(k, slope, slopes)
         if following:
             x = corrected(x, p[slots.OBSERVER] * (followed[k] - out[0, k]), output)

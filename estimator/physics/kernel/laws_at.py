@@ -23,7 +23,7 @@ GIVEN = {
     Place.MOTOR: ("speed",),
     Place.MOTOR_DRY: ("speed",),
     Place.MOTOR_INERTIA: ("inertia", "time_s", "length_s"),
-    Place.JOINT: ("angle",),
+    Place.CARDAN: ("angle",),
     Place.STIFFNESS: ("stiffness", "time_s", "length_s"),
     Place.SPRING: ("twist",),
     Place.SHAFT: ("twist", "rate"),
@@ -63,8 +63,9 @@ def parameters_of(entry: Effect) -> str:
 
 
 def is_on(entry: Effect) -> str:
-    """Return the condition under which a law does anything: its size is off its null."""
-    return f"some(p[{slot(entry.name, entry.parameters[0].name)}] != {entry.parameters[0].null!r})"
+    """Return the condition under which a law does anything: one of its sizes is off its null."""
+    sizes = (each for each in entry.parameters if each.name in entry.sizes)
+    return " | ".join(f"some(p[{slot(entry.name, each.name)}] != {each.null!r})" for each in sizes)
 
 
 def called(entry: Effect, place: Place) -> str:
@@ -77,15 +78,17 @@ def given_at(place: Place) -> dict[str, object]:
     return {**dict.fromkeys(GIVEN[place], float), "p": FloatArray}
 
 
-def total(place: Place, name: str) -> Callable[..., float]:
-    """Return the sum of a place's laws without a state [Nm], of what it gives and the parameters."""
-    calls = [called(each, place) for each in at_place(place) if each not in WITH_STATE]
+def total(place: Place, name: str, is_lasting: bool = False) -> Callable[..., float]:
+    """Return the function that adds up a place's laws without a state [Nm], events left out where it ``is_lasting``."""
+    calls = [
+        called(each, place) for each in at_place(place) if each not in WITH_STATE and not (is_lasting and each.event)
+    ]
     body = [f"return {' + '.join([f'broadcast_as(0.0, {GIVEN[place][0]})', *calls])}"]
     return written(name, given_at(place), float, body, SCOPE)
 
 
 def totals(place: Place, name: str, values: int) -> Callable[..., Any]:
-    """Return the sums of what a place's laws return, several values each."""
+    """Return the function that adds up what a place's laws return, several values each."""
     laws = list(at_place(place))
     body = [f"law{i} = {called(each, place)}" for i, each in enumerate(laws)]
     sums = (" + ".join(f"law{i}[{value}]" for i in range(len(laws))) or "0.0" for value in range(values))
@@ -94,14 +97,14 @@ def totals(place: Place, name: str, values: int) -> Callable[..., Any]:
 
 
 def changed(place: Place, name: str) -> Callable[..., float]:
-    """Return what a place's laws make of the first that it gives, one behind the other."""
+    """Return the function that hands the first that a place gives on from one of its laws to the next."""
     value = GIVEN[place][0]
     body = [*(f"{value} = {called(each, place)}" for each in at_place(place)), f"return {value}"]
     return written(name, given_at(place), float, body, SCOPE)
 
 
 def total_with_states(place: Place, name: str) -> Callable[..., float]:
-    """Return the sum of a place's laws with a state [Nm], of what it gives, the states, ``Around``, the parameters."""
+    """Return the function that adds up a place's laws with a state [Nm], of what it gives, states and ``Around``."""
     given, body = GIVEN[place], [f"torque = broadcast_as(0.0, {GIVEN[place][0]})"]
     for each in at_place(place):
         if each in WITH_STATE:
@@ -126,39 +129,33 @@ def rates_of_states(name: str) -> Callable[..., LawStates]:
     return written(name, types, LawStates, body, SCOPE)
 
 
-def largest(places: Iterable[Place], parameter: str, name: str) -> Callable[[FloatArray], float]:
-    """Return the largest value that a parameter of this name has among the laws at some places."""
-    entries = (each for place in places for each in at_place(place))
-    values = [f"p[{slot(each.name, parameter)}]" for each in entries]
+def largest(place: Place, parameter: str, name: str) -> Callable[[FloatArray], float]:
+    """Return the function that gives the largest value of a parameter of this name among a place's laws."""
+    values = [f"p[{slot(each.name, parameter)}]" for each in at_place(place)]
     body = ["value = " + values[0], *(f"value = max(value, {each})" for each in values[1:]), "return value"]
     return written(name, {"p": FloatArray}, float, body, SCOPE)
 
 
 def any_on(entries: Iterable[Effect], name: str) -> Callable[[FloatArray], bool]:
-    """Return whether a size of one of some entries is off its null."""
-    off = [
-        f"some(p[{slot(each.name, parameter.name)}] != {parameter.null!r})"
-        for each in entries
-        for parameter in each.parameters
-        if parameter.name in each.sizes
-    ]
-    return written(name, {"p": FloatArray}, bool, [f"return {' | '.join(off)}"], SCOPE)
+    """Return the function that tells whether the law of one of some entries does anything."""
+    return written(name, {"p": FloatArray}, bool, [f"return {' | '.join(map(is_on, entries)) or 'False'}"], SCOPE)
 
 
-over_motor_angle = totals(Place.DRIVE_ANGLE, "over_motor_angle", 2)
+rippled = totals(Place.DRIVE_ANGLE, "rippled", 2)
 motor_drag = total(Place.MOTOR, "motor_drag")
 motor_sliding = total(Place.MOTOR_DRY, "motor_sliding")
 motor_inertia = changed(Place.MOTOR_INERTIA, "motor_inertia")
-in_joint = totals(Place.JOINT, "in_joint", 4)
+in_cardan = totals(Place.CARDAN, "in_cardan", 4)
 shaft_stiffness = changed(Place.STIFFNESS, "shaft_stiffness")
 spring_twist = changed(Place.SPRING, "spring_twist")
 shaft_loss = total(Place.SHAFT_LOSS, "shaft_loss")
 load_drag = total(Place.LOAD, "load_drag")
 load_sliding = total(Place.LOAD_DRY, "load_sliding")
+load_lasting = total(Place.LOAD_DRY, "load_lasting", is_lasting=True)
 load_damping = changed(Place.LOAD_DAMPING, "load_damping")
 load_inertia = changed(Place.LOAD_INERTIA, "load_inertia")
 held_by_angle = total(Place.LOAD_ANGLE, "held_by_angle")
-over_recorded_angle = total(Place.RECORDED_ANGLE, "over_recorded_angle")
+load_over_angle = total(Place.RECORDED_ANGLE, "load_over_angle")
 resolved = changed(Place.RESOLVER, "resolved")
 recorded = changed(Place.SENSOR, "recorded")
 
@@ -167,15 +164,16 @@ load_memory = total_with_states(Place.LOAD, "load_memory")
 shaft_memory = total_with_states(Place.SHAFT, "shaft_memory")
 state_rates = rates_of_states("state_rates")
 
-motor_presliding = largest([Place.MOTOR_DRY], "presliding_rad", "motor_presliding")
-load_presliding = largest([Place.LOAD_DRY], "presliding_rad", "load_presliding")
-motor_creep = largest([Place.MOTOR_DRY], "creep_rad_s", "motor_creep")
-load_creep = largest([Place.LOAD_DRY], "creep_rad_s", "load_creep")
+motor_presliding = largest(Place.MOTOR_DRY, "presliding_rad", "motor_presliding")
+load_presliding = largest(Place.LOAD_DRY, "presliding_rad", "load_presliding")
+motor_creep = largest(Place.MOTOR_DRY, "creep_rad_s", "motor_creep")
+load_creep = largest(Place.LOAD_DRY, "creep_rad_s", "load_creep")
 
-has_law_in_shaft = any_on([*at_place(Place.JOINT), *at_place(Place.SPRING), BUILT_IN["backlash"]], "has_law_in_shaft")
-motor_rubs = any_on(at_place(Place.MOTOR_DRY), "motor_rubs")
-load_rubs = any_on(at_place(Place.LOAD_DRY), "load_rubs")
-waves = any_on((each for each in KERNEL.values() if each.waving), "waves")
+is_shaft_bent = any_on([*at_place(Place.CARDAN), *at_place(Place.SPRING), BUILT_IN["backlash"]], "is_shaft_bent")
+has_dry_friction_at_motor = any_on(at_place(Place.MOTOR_DRY), "has_dry_friction_at_motor")
+has_dry_friction_at_load = any_on(at_place(Place.LOAD_DRY), "has_dry_friction_at_load")
+is_waving = any_on((each for each in KERNEL.values() if each.waving), "is_waving")
+has_states = any_on(WITH_STATE, "has_states")
 
 moved_states: Callable[..., LawStates] = written(
     "moved_states",
@@ -194,12 +192,3 @@ no_states: Callable[..., LawStates] = written(
     SCOPE,
 )
 """A 0 of the kind of ``like`` for each law with a state."""
-
-has_states: Callable[[FloatArray], bool] = written(
-    "has_states",
-    {"p": FloatArray},
-    bool,
-    [f"return {' | '.join(f'({is_on(each)})' for each in WITH_STATE) or 'False'}"],
-    SCOPE,
-)
-"""Whether any law with a state is there."""

@@ -10,7 +10,12 @@ import numpy as np
 from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel.conditions import Line, is_bristled, is_bristled_at_motor, with_friction, with_torques
-from estimator.physics.kernel.laws_at import load_rubs, motor_rubs, motor_sliding, no_states
+from estimator.physics.kernel.laws_at import (
+    has_dry_friction_at_load,
+    has_dry_friction_at_motor,
+    motor_sliding,
+    no_states,
+)
 from estimator.physics.kernel.rates import advanced, dry_at_load, runge_kutta, stepped
 from estimator.physics.kernel.state_vector import (
     ANGLE,
@@ -83,7 +88,7 @@ def is_linear(line: Line, p: FloatArray) -> bool:
 @inlined
 def has_dry_friction(p: FloatArray) -> bool:
     """Tell whether a parameter of dry friction is not at its null."""
-    return is_bristled(p) or motor_rubs(p) or load_rubs(p)
+    return is_bristled(p) or has_dry_friction_at_motor(p) or has_dry_friction_at_load(p)
 
 
 @inlined

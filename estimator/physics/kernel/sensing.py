@@ -66,6 +66,6 @@ def smoothed(
 
 
 @inlined
-def shown(read: float, filtered: float, p: FloatArray) -> float:
-    """Return what is recorded of a reading [rad/s]: filtered, and as the sensor has it."""
-    return recorded(filtered if p[slots.FILTER] > 0.0 else read, p)
+def shown(speed: float, angle: float, filtered: float, p: FloatArray) -> float:
+    """Return what is recorded of a speed [rad/s] where an angle is read [rad]: filtered, and as the sensor has it."""
+    return recorded(filtered if p[slots.FILTER] > 0.0 else resolved(speed, angle, p), p)

@@ -22,7 +22,7 @@ from estimator.physics.kernel.conditions import (
     with_torques,
 )
 from estimator.physics.kernel.integration import Masses, call_specialised, fed, feed_from, integrate, is_late, with_mode
-from estimator.physics.kernel.laws_at import resolved, waves
+from estimator.physics.kernel.laws_at import is_waving
 from estimator.physics.kernel.linear import is_linear
 from estimator.physics.kernel.rates import read_out, stepped
 from estimator.physics.kernel.sensing import shown, smoothed
@@ -188,7 +188,7 @@ def advance(
     start, out, filters = as_lanes(state_lanes), as_lanes(out_lanes), as_lanes(low_lanes)
     h = sample_time_s / substeps
     length = 1.0 / substeps
-    waving = waves(one_of_them)
+    waving = is_waving(one_of_them)
     samples, output, following = load_lanes.shape[0], outputs[0], followed.shape[0] > 0
     parts = torque_lanes.shape[0] // samples
     x = unpacked(start)
@@ -263,8 +263,7 @@ def integrate_side_by_side(
         for k in range(first, torque.shape[1]):
             for i in range(count):
                 value = values[k * count + i, lane]
-                read = value if filtering else resolved(value, angle[k], own)
-                out[rows[lane], i, k] = shown(read, value, own) if sensor and i == 0 else value
+                out[rows[lane], i, k] = shown(value, angle[k], value, own) if sensor and i == 0 else value
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Places of every parameter in the vector that the simulation takes."""
+"""Places of the parameters that the kernel reads by name, in the vector that a simulation takes."""
 
 from __future__ import annotations
 

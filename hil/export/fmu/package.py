@@ -19,7 +19,7 @@ from drivers.foreign_file import read_regular
 from estimator.physics import inputs
 from estimator.physics.curve import curve
 from estimator.physics.effects.timing import FASTEST_S, lag_step, low_pass
-from estimator.physics.kernel import conditions, laws_at, rates, sensing, slots, state_vector
+from estimator.physics.kernel import conditions, rates, sensing, slots, state_vector
 from estimator.physics.layout import SIZE, slot
 from hil.child import run
 from hil.config.model_file import read_model, read_model_for_recordings
@@ -48,7 +48,7 @@ from hil.version import install_hint
 USED = (
     conditions.conditions, conditions.with_torque, conditions.is_elastic, conditions.is_extended,
     conditions.is_bristled, conditions.bent, conditions.rubbed, rates.stepped, rates.rates, rates.shaft_torques,
-    sensing.entry, laws_at.resolved, sensing.read_angle, sensing.smoothed, sensing.shown, low_pass, lag_step,
+    sensing.entry, sensing.read_angle, sensing.smoothed, sensing.shown, low_pass, lag_step,
     inputs.follow,
 )  # fmt: skip
 """What driveline.c calls; what these call comes along."""

@@ -11,12 +11,12 @@ import zipfile
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element as XmlElement, SubElement, indent, tostring
 
 from estimator.diagnosis.flange import AT_LOAD, AT_MOTOR, FREE, slots_of, with_only
 from estimator.diagnosis.result import Diagnosis
 from estimator.physics.catalogue import EFFECTS
-from estimator.physics.effect import Element as Place
+from estimator.physics.effect import Element
 from estimator.physics.layout import flat, slot
 from estimator.physics.model import Structure
 from estimator.signals.record import Location, OutputKind, Record
@@ -43,7 +43,7 @@ def augmented_ssp(diagnosis: Diagnosis, line: FmuLine, fmu: Path, record: Record
     is_rigid = line.model.structure is Structure.ONE_MASS
     behind = [] if is_rigid else [name for name in effects if name in AT_LOAD]
     before = [name for name in effects if name not in behind]
-    outside = (Place.TORQUE_PATH, Place.SPEED_SENSOR, Place.ACQUISITION)
+    outside = (Element.TORQUE_PATH, Element.SPEED_SENSOR, Element.ACQUISITION)
     known = (*AT_MOTOR, *(AT_LOAD if is_rigid else ()), *(n for n, each in EFFECTS.items() if each.element in outside))
     at_load = bool(named.load_speed) and line.fmu.is_input(named.load)
     is_at_motor = bool(effects) and record.location is Location.MOTOR and record.kind is OutputKind.SPEED
@@ -98,7 +98,7 @@ def structure(
     """Return SystemStructure.ssd of some FMUs; ``values`` are parameters of the user's."""
     spaces = {"ssd": "Description", "ssc": "Common", "ssv": "ParameterValues"}
     of_file = {f"xmlns:{short}": STANDARD + each for short, each in spaces.items()}
-    root = Element("ssd:SystemStructureDescription", {**of_file, "name": name, "version": "1.0"})
+    root = XmlElement("ssd:SystemStructureDescription", {**of_file, "name": name, "version": "1.0"})
     root.set("generationTool", f"hil {__version__}")
     system = SubElement(root, "ssd:System", {"name": "augmented"})
     _connectors(system, OUTSIDE, connections)
@@ -122,7 +122,7 @@ def structure(
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _connectors(into: Element, of: str, connections: Collection[Connection]) -> None:
+def _connectors(into: XmlElement, of: str, connections: Collection[Connection]) -> None:
     """List what of an element is connected; what comes into the system leaves its own connector."""
     leaves, enters = ("input", "output") if of == OUTSIDE else ("output", "input")
     kinds = {start: leaves for one, start, _, _ in connections if one == of}

@@ -14,7 +14,7 @@ from estimator.lanes import borrowed
 from estimator.physics import laws
 from estimator.physics.effects.drag import quadratic_law, warming_law
 from estimator.physics.effects.dry_friction import brake_law, stribeck_law
-from estimator.physics.effects.inertia import coupled_law
+from estimator.physics.effects.inertia import with_more_law
 from estimator.physics.effects.load import carcass, coupling, gripped
 from estimator.physics.effects.sensor import blind_law, resolver_law
 from estimator.physics.effects.shaft import cracked_law, damping_share, loading_rate, pressed, stiffness_factor
@@ -56,7 +56,7 @@ LAWS: list[tuple[Callable[..., Any], Sequence[Sequence[float]]]] = [
     (_slope, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
     (_share, [EITHER_SIDE, (1e-3, 0.2), (0.1, 4.0), (0.005, 0.3), (5.0, 400.0)]),
     (warming_law, [(0.7,), (0.0, 3.0, 600.0), (0.01,), SIZES, (20.0, 300.0), (0.0, 0.4)]),
-    (coupled_law, [(1.0, 30.0), (0.0, 3.0), (0.1, 2.0), (0.0, 5.0), (-1.0, 0.5), (0.6, 4.0)]),
+    (with_more_law, [(1.0, 30.0), (0.0, 3.0), (0.1, 2.0), (0.0, 5.0), (-1.0, 0.5), (0.6, 4.0)]),
     (cracked_law, [(900.0,), (0.0, 3.0), (0.1, 2.0), (-0.2, 0.0, 0.5), (-1.0, 0.5), (0.6, 4.0)]),
     (resolver_law, [EITHER_SIDE, (0.3, 40.0), (0.0, 0.01), (0.0, 0.02), (0.4,), (-1.0,)]),
     (blind_law, [EITHER_SIDE, (0.0, 0.4, 1.0)]),

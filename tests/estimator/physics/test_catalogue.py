@@ -181,7 +181,7 @@ CHANGING = {
     **dict.fromkeys(
         (Place.MOTOR_INERTIA, Place.LOAD_INERTIA, Place.STIFFNESS, Place.LOAD_DAMPING, Place.LOAD_DRY), "time_s"
     ),
-    **dict.fromkeys((Place.DRIVE_ANGLE, Place.JOINT, Place.RECORDED_ANGLE), "angle"),
+    **dict.fromkeys((Place.DRIVE_ANGLE, Place.CARDAN, Place.RECORDED_ANGLE), "angle"),
 }
 """What a law is given that changes during a recording, at places whose laws are not worked out at every step."""
 
@@ -200,6 +200,13 @@ def test_a_law_that_changes_all_the_time_is_worked_out_at_every_step(entry: Effe
         assert entry.waving or entry.event or early == late, (
             f"{entry.name} needs waving=True: it changes with {changing}"
         )
+
+
+@entries
+def test_a_law_over_the_recorded_angle_has_a_phase(entry: Effect) -> None:
+    """Without one no angle is worked out."""
+    if entry.acting is not None and CHANGING.get(entry.acting.place) == "angle":
+        assert entry.phases, f"{entry.name} is always given the angle 0"
 
 
 @entries

@@ -46,13 +46,17 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "a branch that relaxes": {"viscoelastic_shaft": {"branch_share": 0.4, "relaxation_s": 0.02}},
     "a spring to the ground": {"grounded_spring": {"stiffness_nm_per_rad": 300.0}},
     "an offset": {"torque_bias": {"offset_nm": 9.0, "time_constant_s": 1.0}},
+    "Stribeck friction without excess": {"stribeck_friction": {"coulomb_nm": 20.0, "stribeck_rad_s": 2.0}},
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
 }
 """What makes the line nonlinear unless friction is described by bristles."""
 
 LINES = {"one mass": ONE_MASS, "two masses": TWO_MASS, "three masses": THREE_MASS}
 OUTSIDE_THE_LINE = ("delay", "lag", "filter", "drift", "an offset")
-OF_ONE_MASS = ("nothing", *OUTSIDE_THE_LINE, "a spring to the ground", "a brake", "a brake that sticks", "a ripple")
+OF_ONE_MASS = (
+    *("nothing", *OUTSIDE_THE_LINE, "a spring to the ground", "a brake", "a brake that sticks", "a ripple"),
+    "Stribeck friction without excess",
+)
 
 
 def line_with(values: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]) -> DrivelineModel:

@@ -235,7 +235,7 @@ void driveline_update(Driveline *d) {
     Bristles held = {rest[BRISTLES_MOTOR], rest[BRISTLES_LOAD]};
     if (conditions_is_bristled(p)) felt = conditions_rubbed(now, held, p);
     State moving = rates_rates(made, conditions_with_torque(felt, drive), x, p);
-    v[SPEED_MEASURED] = sensing_shown(laws_at_resolved(sensing_entry(x, OUTPUT, p), angle, p), rest[FILTERED], p);
+    v[SPEED_MEASURED] = sensing_shown(sensing_entry(x, OUTPUT, p), angle, rest[FILTERED], p);
     v[SPEED_MOTOR] = x.speed;
     v[ANGLE_MOTOR] = x.angle;
     v[SPEED_LOAD] = MASSES == 1 ? x.speed : x.load_speed;

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.descent import Effort, descended, extended
+from estimator.diagnosis.inference.descent import ROUGH, WHOLE, Effort, Start, descended, extended, fitted
+from estimator.diagnosis.inference.disturbances import limits_of
+from estimator.diagnosis.inference.hypotheses import Catalogue
+from estimator.diagnosis.thresholds import Fitting
 from estimator.physics.fit import FitResult, fit, not_fitted, warm_start
 from estimator.physics.jacobian import jacobian_at
 from estimator.physics.problem import Problem, make_problem, start_vector
@@ -66,3 +71,24 @@ def test_from_a_carried_derivative_the_effect_is_found(nominal: FitResult) -> No
     ended = descended(begun, by_noise, Effort(derivatives=6, steps=30))
     assert ended.value("actuator_lag", "time_constant_s") == pytest.approx(0.008, rel=0.05)
     assert ended.rms == pytest.approx(SIGMA, rel=0.05)
+
+
+def test_a_fit_to_its_end_is_no_less_likely_than_a_rough_one_from_the_same_start() -> None:
+    problem, limits = problem_with("actuator_lag"), limits_of(BENCH.records)
+    start = Start(not_fitted(problem, start_vector(problem)), limits.usual, limits)
+    effects, catalogue = frozenset({"actuator_lag"}), Catalogue(BENCH.model, 1, {})
+    rough, whole = (fitted(effects, start, depth, catalogue) for depth in (ROUGH, WHOLE))
+    assert whole.minus_twice_log <= rough.minus_twice_log
+    assert whole.result.values_of("actuator_lag")["time_constant_s"] == pytest.approx(0.008, rel=0.1)
+
+
+def test_a_pass_follows_on_one_that_gained_enough() -> None:
+    """Of a rough fit per sample; of one to its end in all, and the less, the nearer what it is compared with."""
+    enough = Fitting.MUCH * 1000
+    assert ROUGH.is_settled(100.0, 100.0 - 0.9 * enough, 1000, math.nan)
+    assert not ROUGH.is_settled(100.0, 100.0 - 1.1 * enough, 1000, math.nan)
+    gained = 10.0 * Fitting.SETTLED_DEVIANCE
+    assert WHOLE.is_settled(100.0, 100.0 - 0.1 * gained / 2.0, 1000, math.nan)
+    assert not WHOLE.is_settled(100.0, 100.0 - gained, 1000, math.nan)
+    assert not WHOLE.is_settled(100.0, 100.0 - gained, 1000, rival=100.0)
+    assert WHOLE.is_settled(100.0, 100.0 - gained, 1000, rival=100.0 - 2.0 * gained / Fitting.DIGITS)
