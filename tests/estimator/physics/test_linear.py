@@ -46,7 +46,9 @@ EFFECTS: dict[str, Mapping[str, Mapping[str, float]]] = {
     "a branch that relaxes": {"viscoelastic_shaft": {"branch_share": 0.4, "relaxation_s": 0.02}},
     "a spring to the ground": {"grounded_spring": {"stiffness_nm_per_rad": 300.0}},
     "an offset": {"torque_bias": {"offset_nm": 9.0, "time_constant_s": 1.0}},
-    "Stribeck friction without excess": {"stribeck_friction": {"coulomb_nm": 20.0, "stribeck_rad_s": 2.0}},
+    "Stribeck friction without excess": {
+        "stribeck_friction": {"excess_nm": 0.0, "coulomb_nm": 20.0, "stribeck_rad_s": 2.0}
+    },
     "a ripple": {"torque_ripple": {"amplitude_nm": 2.0, "order": 6.0}},
 }
 """What makes the line nonlinear unless friction is described by bristles."""
