@@ -193,7 +193,7 @@ def reading(name: str) -> Callable[[Values], Curve]:
     def curve(values: Values) -> Curve:
         speeds = np.linspace(-5.0, 5.0, 401)
         p = flat_values(BUS, {name: values})
-        read = np.array([sensing.shown(w, w, p) for w in speeds])
+        read = np.array([sensing.shown(w, 0.0, w, p) for w in speeds])
         return Curve("motor speed [rad/s]", "reading [rad/s]", (("without", speeds, speeds), ("with", speeds, read)))
 
     return curve
