@@ -15,7 +15,7 @@ from estimator.physics.fit import FitResult, fit
 from estimator.physics.layout import LOAD, Grid, slot
 from estimator.physics.model import DrivelineModel
 from estimator.physics.own_scan import Projector, cells, scan, waves
-from estimator.physics.problem import Problem, case_of, make_problem, start_of, start_vector
+from estimator.physics.problem import Problem, case_of, far_away, make_problem, start_of, start_vector
 from estimator.physics.simulate import simulate_each
 from estimator.physics.table_signals import beyond_knots
 from estimator.physics.tables import COUNT, PREFIX, TABLES
@@ -40,7 +40,7 @@ class FreeRun:
     rms: float  # RMS of its error over the good samples
     start: InitialCondition  # load torque and initial state that were estimated
     further: tuple[FloatArray, ...] = ()  # (N,)
-    beyond: tuple[str, ...] = ()  # sentences on curves of the model beyond whose knots it went
+    beyond: tuple[str, ...] = ()  # sentences on curves beyond whose knots it went, and on a run that ran away
 
 
 def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) -> FreeRun:
@@ -54,7 +54,20 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
     views = separated_outputs([record], lambda _: 1.0)[1:]
     further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
     beyond = beyond_knots(model.effects, problem.grid, record, case, model.motion) if model.plant is None else ()
-    return FreeRun(result.outputs[0], result.rms, whole, further, beyond)
+    return FreeRun(result.outputs[0], result.rms, whole, further, (*beyond, *ran_away(result.outputs[0], record)))
+
+
+def ran_away(output: FloatArray, record: Record) -> tuple[str, ...]:
+    """Return a sentence on a simulated output, shape (N,), that was held where it ran away; none where it did not."""
+    gone = np.abs(output) >= far_away(record)
+    if not gone.any():
+        return ()
+    at_s, most = float(record.time_s[np.argmax(gone)]), float(np.abs(output).max())
+    return (
+        f"{record.name}: the simulation runs away and is held at ±{most:.4g} from {at_s:.4g} s on: its numbers mean "
+        "nothing. Check the model's values: an inertia or a stiffness that an effect leaves at 0 or below, or a law so "
+        "steep that no step can follow it.",
+    )
 
 
 def settle(problem: Problem, known: Own = NOTHING_KNOWN) -> FitResult:
