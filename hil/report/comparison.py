@@ -47,6 +47,7 @@ class Comparison:
     past_input: CorrelationTest  # of the error and torques before it
     itself: CorrelationTest  # of the error and its own past
     further: tuple[Comparison, ...] = ()  # those of the recording's further outputs that the model simulates
+    beyond: tuple[str, ...] = ()  # sentences on what the simulation is no longer to be believed for
 
     @property
     def outputs(self) -> tuple[Comparison, ...]:
@@ -66,7 +67,7 @@ def compare_record(plant: Plant, record: Record) -> Comparison:
     load = run.start.load_torque_nm
     pairs = zip(views, run.further, strict=True) if run.further else ()
     further = tuple(_compared(plant, view, _from_its_zero(view, found), load) for view, found in pairs)
-    return replace(_compared(plant, record, run.output, load), further=further)
+    return replace(_compared(plant, record, run.output, load), further=further, beyond=run.beyond)
 
 
 def _from_its_zero(record: Record, simulated: FloatArray) -> FloatArray:
@@ -190,6 +191,9 @@ def compared(
     for line in () if reads is not None else unusable:
         tell(line)
     by_model = [_of_model(path, files.get(path), records, recordings, mapped, trust) for path in models]
+    for each in (comparison for of_model in by_model for comparison in of_model):
+        for sentence in each.beyond:
+            tell(f"{each.model}: {sentence}")
     return [list(of_recording) for of_recording in zip(*by_model, strict=True)]
 
 

@@ -50,11 +50,15 @@ def test_the_simulation_is_the_motion_in_closed_form(
     assert float(load[1]) == pytest.approx(bench.LOAD, abs=0.02)
 
 
-def test_a_simulation_that_runs_away_says_so(arguments: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_simulation_that_runs_away_is_reported_by_both_commands(
+    arguments: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     with arguments["--model"].open("a") as file:
         file.write("\n[effects.warming_friction]\ncold_nm_s = { value = 1e8 }\ntime_constant_s = { value = 3.0 }\n")
     assert call(arguments) == 0
     assert "run_1: the simulation runs away" in capsys.readouterr().err
+    assert run(["compare", str(arguments["--model"]), str(arguments["--input"])]) == 0
+    assert "drive.toml: run_1: the simulation runs away" in capsys.readouterr().err
 
 
 def test_a_position_in_translation_is_named_and_scaled(arguments: dict[str, Path]) -> None:
