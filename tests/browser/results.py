@@ -1,7 +1,6 @@
 """One result for each kind of page, made once: pages are judged, not results."""
 
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,8 @@ import numpy as np
 from estimator.identification.identify import Compared, Study, compare, identify, study
 from estimator.identification.online.estimators import ESTIMATORS
 from estimator.identification.settings import Settings
+from estimator.physics.driveline import InitialCondition
+from estimator.physics.free_run import FreeRun
 from estimator.physics.model import Motion
 from estimator.signals.record import Record
 from hil.figures.local_model import LocalModel, Reference, TwoMassLine, row_of
@@ -44,9 +45,10 @@ class Smoothed:
     def __init__(self, name: str, samples: int) -> None:
         self.name, self._samples = name, samples
 
-    def run(self, record: Record) -> Any:
+    def run(self, record: Record) -> FreeRun:
         output = np.convolve(record.output, np.full(self._samples, 1.0 / self._samples), mode="same")
-        return SimpleNamespace(output=output, start=SimpleNamespace(load_torque_nm=58.0), further=())
+        start = InitialCondition(load_torque_nm=58.0, angle_rad=0.0, speed_rad_s=float(output[0]))
+        return FreeRun(output, float(np.std(record.output - output)), start)
 
 
 @cache
