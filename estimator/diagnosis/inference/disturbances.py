@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from estimator.diagnosis.line.line import LASTS, FormPlace, LinearLine, changes_of, line_of
-from estimator.diagnosis.line.whitening import Gains, Terms, fill_gains, innovate, terms_of
+from estimator.diagnosis.line.whitening import (
+    Gains,
+    StateSpace,
+    Terms,
+    fill_gains,
+    innovate,
+    innovate_each,
+    terms_of,
+)
 from estimator.diagnosis.noise import noise_floor
 from estimator.diagnosis.priors import DisturbancePriors
 from estimator.diagnosis.thresholds import Fitting
+from estimator.lanes import LANES
 from estimator.physics.fit import FitResult
 from estimator.physics.motion import torque_scale
 from estimator.physics.parallel import check_time
@@ -43,8 +52,9 @@ class Size(IntEnum):
 
 
 def readings(sizes: FloatArray) -> FloatArray:
-    """Return the sizes of each output's reading, shape (C, 3), of a noise model of C outputs."""
-    return np.concatenate([sizes[:READING], sizes[len(Size) :]]).reshape(-1, READING)
+    """Return the sizes of each output's reading, shape (..., C, 3), of noise models (..., S) of C outputs."""
+    both = np.concatenate([sizes[..., :READING], sizes[..., len(Size) :]], axis=-1)
+    return both.reshape(*sizes.shape[:-1], -1, READING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,73 +89,117 @@ class Whitener:
             found[rows] = np.log(gains.spread.T[use.T])
         return found
 
-    def minus_twice_log(self, innovations: FloatArray) -> float:
-        """Return minus twice the log likelihood of stacked innovations, shape (R,), but for its constant."""
-        return 2.0 * float(self.logs.sum()) + float(innovations @ innovations)
+
+class Innovations(NamedTuple):
+    """The innovations of an error under each of L noise models, and the logarithms of their standard deviations."""
+
+    values: FloatArray  # (L, R)
+    logs: FloatArray  # (L, R)
+
+    @property
+    def minus_twice_log(self) -> FloatArray:
+        """Minus twice the log likelihood of each noise model, shape (L,), but for its constant."""
+        return 2.0 * self.logs.sum(axis=1) + np.sum(self.values**2, axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Whitening:
+    """What the filters of some recordings depend on, beside the noise model."""
+
+    line: LinearLine
+    period_s: float  # between samples [s]
+    use: Sequence[BoolArray]  # (N_i, C): which outputs were read
+    unread: Sequence[FloatArray]  # (N_i,): variance of the torque where it was not read
+    rows: Sequence[Rows]  # where the samples of each recording stand when stacked
+    changes: Sequence[FloatArray] = ()  # (3, N_i): by how much laws change at each place; nothing where none does
+
+    @property
+    def off(self) -> list[FormPlace]:
+        """The places at which laws are off by their forms."""
+        return [place for place in FormPlace if any(change[place].any() for change in self.changes)]
+
+    def filters(self, sizes: FloatArray) -> Whitener:
+        """Return the filters of the recordings under a noise model, ``sizes`` as `Size` says."""
+        model = self._model(sizes[np.newaxis]).at(0)
+        seen: dict[tuple[bytes, bytes], Gains] = {}
+        each = []
+        for i, mask in enumerate(self.use):
+            unread = self._unread(i)
+            key = mask.tobytes(), unread.tobytes()
+            if key not in seen:
+                count, m = mask.shape[1], model.at_input.shape[1]
+                seen[key] = Gains(np.empty((*mask.shape, m)), np.empty((*mask.shape, count)), np.empty(mask.shape))
+                fill_gains(model, mask, unread, seen[key])
+            each.append(seen[key])
+        return Whitener(model.f, model.h, tuple(each), tuple(self.use), tuple(self.rows))
+
+    def innovations(self, error: FloatArray, sizes: FloatArray) -> Innovations:
+        """Return the innovations of a stacked error, shape (R,), under noise models, shape (L, S)."""
+        found = Innovations(*np.empty((2, len(sizes), error.size)))
+        for first in range(0, len(sizes), LANES):
+            some = slice(first, first + LANES)
+            count = sizes[some].shape[0]
+            model = self._model(np.resize(sizes[some], (LANES, sizes.shape[1])))
+            m = model.at_input.shape[1]
+            for i, (mask, rows) in enumerate(zip(self.use, self.rows, strict=True)):
+                mine = error[rows]
+                values, variances = np.empty((mine.size, LANES)), np.empty((mine.size, LANES))
+                places = np.concatenate([[0], np.cumsum(mask.sum(axis=0))[:-1]])
+                room = np.zeros((m * m, LANES)), np.zeros((m, LANES)), np.zeros((m, LANES))
+                innovate_each(model, mask, self._unread(i), mine, places, model.prior.copy(), room, values, variances)
+                found.values[some, rows] = (values / np.sqrt(variances)).T[:count]
+                found.logs[some, rows] = 0.5 * np.log(variances).T[:count]
+        return found
+
+    def _unread(self, index: int) -> FloatArray:
+        """Return the variance of each input that a recording does not tell, before its share, shape (N, n)."""
+        off = self.off
+        changes = [(1.0 - np.exp(-2.0 / LASTS)) * self.changes[index][place] ** 2 for place in off]
+        return np.column_stack([self.unread[index], *changes])
+
+    def _model(self, sizes: FloatArray) -> StateSpace:
+        """Return the model of the errors under L noise models, shape (L, S)."""
+        line, off, period_s = self.line, self.off, self.period_s
+        torque, drift, drift_s, walk, share = np.exp(sizes[:, READING : len(Size)]).T
+        white, coloured, colour_s = np.exp(readings(sizes).transpose(2, 1, 0).copy())
+        count, n = line.h.shape
+        m = n + 2 + count + len(off)  # drift, walk, coloured of each output, laws off by their forms
+        drifting, walking, colours = n, n + 1, n + 2 + np.arange(count)
+        forms = n + 2 + count + np.arange(len(off))
+        f, q, prior = np.zeros((3, m, m, len(sizes)))
+        h, at_input = np.zeros((count, m)), np.zeros((1 + len(off), m))
+        kept_drift, kept_colour = np.exp(-period_s / drift_s), np.exp(-period_s / colour_s)
+        f[:n, :n], f[:n, drifting], f[:n, walking] = (each[..., None] for each in (line.f, line.torque, line.load))
+        f[drifting, drifting], f[walking, walking], f[colours, colours] = kept_drift, 1.0, kept_colour
+        f[forms, forms] = np.exp(-1.0 / LASTS)
+        for place, state in zip(off, forms, strict=True):
+            f[:n, state] = (line.torque, line.load, line.shaft)[place][:, None]
+        q[:n, :n] = torque**2 * np.outer(line.torque, line.torque)[..., None]
+        q[drifting, drifting], q[walking, walking] = drift**2 * (1.0 - kept_drift**2), walk**2 * period_s
+        q[colours, colours] = coloured**2 * (1.0 - kept_colour**2)
+        prior[drifting, drifting], prior[colours, colours] = drift**2, coloured**2
+        h[:, :n], h[:, walking], h[np.arange(count), colours] = line.h, line.direct, 1.0
+        at_input[0, :n], at_input[1:, forms] = line.torque, np.eye(len(off))
+        shares = np.vstack([np.ones(len(sizes)), np.tile(share**2, (len(off), 1))])
+        flat = [each.reshape(m * m, len(sizes)) for each in (q, prior)]
+        return StateSpace(terms_of(f), terms_of(h), flat[0], white**2, flat[1], at_input, shares)
 
 
 def whitener_of(result: FitResult, sizes: FloatArray) -> Whitener:
     """Return the filters of a fit's errors under a noise model, ``sizes`` as `Size` says."""
-    return whitening_of(result)(sizes)
+    return whitening_of(result).filters(sizes)
 
 
-def whitening_of(result: FitResult) -> Callable[[FloatArray], Whitener]:
-    """Return a function from a noise model to the filters of a fit's errors."""
+def whitening_of(result: FitResult) -> Whitening:
+    """Return what turns noise models into the filters of a fit's errors."""
     problem = result.problem
     parts, firsts = by_output(problem.records), problem.records[: len(problem.bases)]
     use = [np.zeros((record.time_s.size, len(parts)), dtype=np.bool_) for record in firsts]
     for output, part in enumerate(parts):
         for i in range(part.start, part.stop):
             use[problem.leads[i]][:, output] = problem.use[i]
-    line, changes = line_of(result), changes_of(result)
     unread = [stand_in_variance(record) for record in firsts]
-    return partial(whitener, line, firsts[0].sample_time_s, use, unread, problem.rows, changes=changes)
-
-
-def whitener(
-    line: LinearLine,
-    period_s: float,
-    use: Sequence[BoolArray],
-    unread: Sequence[FloatArray],
-    rows: Sequence[Rows],
-    sizes: FloatArray,
-    changes: Sequence[FloatArray] = (),
-) -> Whitener:
-    """Return the filters of recordings under a noise model, ``sizes`` as `Size` says."""
-    torque, drift, drift_s, walk, share = np.exp(sizes[READING : len(Size)])
-    white, coloured, colour_s = np.exp(readings(sizes)).T
-    count, n = line.h.shape
-    off = [place for place in FormPlace if any(change[place].any() for change in changes)]
-    m = n + 2 + count + len(off)  # drift, walk, coloured of each output, laws off by their forms
-    forms = n + 2 + count + np.arange(len(off))
-    colours = n + 2 + np.arange(count)
-    f, q, prior, h = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((count, m))
-    kept_drift, kept_colour = np.exp(-period_s / drift_s), np.exp(-period_s / colour_s)
-    f[:n, :n], f[:n, n], f[:n, n + 1] = line.f, line.torque, line.load
-    f[n, n], f[n + 1, n + 1], f[colours, colours] = kept_drift, 1.0, kept_colour
-    q[:n, :n] = torque**2 * np.outer(line.torque, line.torque)
-    q[n, n], q[n + 1, n + 1] = drift**2 * (1.0 - kept_drift**2), walk**2 * period_s
-    q[colours, colours] = coloured**2 * (1.0 - kept_colour**2)
-    prior[n, n], prior[colours, colours] = drift**2, coloured**2
-    h[:, :n], h[:, n + 1], h[np.arange(count), colours] = line.h, line.direct, 1.0
-    at_input = np.zeros((1 + len(off), m))
-    at_input[0, :n], at_input[1:, forms] = line.torque, np.eye(len(off))
-    kept_form = np.exp(-1.0 / LASTS)
-    f[forms, forms] = kept_form
-    for place, state in zip(off, forms, strict=True):
-        f[:n, state] = (line.torque, line.load, line.shaft)[place]
-    terms = terms_of(f)
-    seen: dict[tuple[bytes, bytes], Gains] = {}
-    each = []
-    for i, (mask, own) in enumerate(zip(use, unread, strict=True)):
-        of_forms = [(1.0 - kept_form**2) * (share * changes[i][place]) ** 2 for place in off]
-        variance = np.column_stack([own, *of_forms])
-        key = mask.tobytes(), variance.tobytes()
-        if key not in seen:
-            seen[key] = Gains(np.empty((*mask.shape, m)), np.empty((*mask.shape, count)), np.empty(mask.shape))
-            fill_gains(terms, h, q, white**2, prior, mask, at_input, variance, seen[key])
-        each.append(seen[key])
-    return Whitener(terms, terms_of(h), tuple(each), tuple(use), tuple(rows))
+    return Whitening(line_of(result), firsts[0].sample_time_s, use, unread, problem.rows, changes_of(result))
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +273,10 @@ def limits_for(records: Sequence[Record], white: float) -> Limits:
     return Limits(np.clip(usual, low, high), low, high)
 
 
-def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> float:
-    """Return how far a noise model is from the usual one."""
-    return float(np.sum(((sizes - limits.usual) / DisturbancePriors.PRIOR_SPREAD) ** 2))
+def minus_twice_log_prior(sizes: FloatArray, limits: Limits) -> FloatArray:
+    """Return how far each of L noise models, shape (L, S), is from the usual one, shape (L,)."""
+    found: FloatArray = np.sum(((sizes - limits.usual) / DisturbancePriors.PRIOR_SPREAD) ** 2, axis=1)
+    return found
 
 
 def starts(sizes: FloatArray, limits: Limits) -> list[FloatArray]:
@@ -239,34 +294,37 @@ def estimated(
 ) -> tuple[FloatArray, float]:
     """Return the most probable noise model of a fit's error and its minus twice log-posterior."""
     check_time()
-    whitened = whitening_of(result)
-    limits = limits if changes_of(result) else limits.without_forms()
+    whitening = whitening_of(result)
+    limits = limits if whitening.changes else limits.without_forms()
     initial = starts(sizes, limits) if is_anew else [sizes]
-    return min((estimate(whitened, error, each, limits, rounds) for each in initial), key=lambda each: each[1])
+    return min((estimate(whitening, error, each, limits, rounds) for each in initial), key=lambda each: each[1])
+
+
+DAMPINGS = 5.0 ** np.arange(LANES)
+"""By what the damping of a scoring step is multiplied, of steps that are tried at once."""
 
 
 def estimate(
-    whitened: Callable[[FloatArray], Whitener], error: FloatArray, initial: FloatArray, limits: Limits, rounds: int
+    whitening: Whitening, error: FloatArray, initial: FloatArray, limits: Limits, rounds: int
 ) -> tuple[FloatArray, float]:
-    """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring."""
+    """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring.
 
-    def at(sizes: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        filtered = whitened(sizes)
-        innovations, logs = filtered(error), filtered.logs
-        value = 2.0 * float(logs.sum()) + float(innovations @ innovations) + minus_twice_log_prior(sizes, limits)
-        return value, innovations, logs
+    The derivatives by all sizes, and steps of all dampings, take a filter each; these run side by side.
+    """
+
+    def at(sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        found = whitening.innovations(error, sizes)
+        return found.minus_twice_log + minus_twice_log_prior(sizes, limits), found.values, found.logs
 
     sizes = np.clip(initial, limits.low, limits.high)
-    value, innovations, logs = at(sizes)
-    damping = 1e-2
+    value, innovations, logs = (each[0] for each in at(sizes[np.newaxis]))
+    moving, damping = limits.low < limits.high, 1e-2
     for _ in range(rounds):
-        by_log, by_error = np.zeros((sizes.size, error.size)), np.zeros((sizes.size, error.size))
-        for i in np.flatnonzero(limits.low < limits.high):
-            moved = sizes.copy()
-            moved[i] += STEP if sizes[i] + STEP <= limits.high[i] else -STEP
-            step = moved[i] - sizes[i]
-            _, there, their_logs = at(moved)
-            by_log[i], by_error[i] = (their_logs - logs) / step, (there - innovations) / step
+        steps = np.where(sizes + STEP <= limits.high, STEP, -STEP)
+        _, there, their_logs = at(sizes + np.diag(steps)[moving])
+        by_log, by_error = np.zeros((2, sizes.size, error.size))
+        by_log[moving] = (their_logs - logs) / steps[moving, np.newaxis]
+        by_error[moving] = (there - innovations) / steps[moving, np.newaxis]
         # d(innovation / spread) holds both changes: e' = de/s - e dlog s
         pure = by_error + innovations * by_log
         gradient = 2.0 * by_log.sum(axis=1) + 2.0 * by_error @ innovations
@@ -274,21 +332,19 @@ def estimate(
         information = (
             4.0 * by_log @ by_log.T + 2.0 * pure @ pure.T + 2.0 * np.eye(sizes.size) / DisturbancePriors.PRIOR_SPREAD**2
         )
-        promised = 0.0
-        while damping < 1e6:
-            at_bound = ((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0))
-            free = (limits.low < limits.high) & ~at_bound
-            damped = (information + damping * np.diag(np.diag(information)))[np.ix_(free, free)]
-            step = np.zeros(sizes.size)
-            step[free] = -np.linalg.solve(damped, gradient[free])
-            tried = np.clip(sizes + np.clip(step, -2.0, 2.0), limits.low, limits.high)
-            moved_value, moved_innovations, moved_logs = at(tried)
-            promised = value - moved_value
-            if promised > 0.0:
-                damping *= 0.2
-                sizes, value, innovations, logs = tried, moved_value, moved_innovations, moved_logs
-                break
-            damping *= 5.0
-        if promised < Fitting.ENOUGH:
+        at_bound = ((sizes <= limits.low) & (gradient > 0.0)) | ((sizes >= limits.high) & (gradient < 0.0))
+        free = moving & ~at_bound
+        tried = np.tile(sizes, (LANES, 1))
+        for each, factor in zip(tried, DAMPINGS, strict=True):
+            damped = (information + damping * factor * np.diag(np.diag(information)))[np.ix_(free, free)]
+            each[free] -= np.clip(np.linalg.solve(damped, gradient[free]), -2.0, 2.0)
+        tried = np.clip(tried, limits.low, limits.high)
+        values, there, their_logs = at(tried)
+        best = int(np.argmin(values))
+        gained = value - values[best]
+        if gained > 0.0:
+            damping *= 0.2 * DAMPINGS[best]
+            sizes, value, innovations, logs = tried[best], values[best], there[best], their_logs[best]
+        if not gained >= Fitting.ENOUGH:
             break
-    return sizes, value
+    return sizes, float(value)

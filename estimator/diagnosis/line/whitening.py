@@ -1,18 +1,23 @@
-"""The Kalman filter that turns a free-run error into its innovations, compiled: gains once, then any signals.
+"""The Kalman filter that turns a free-run error into its innovations, compiled.
 
 Model: ``x[t+1] = F x[t] + w``, ``y[t] = H x[t] + v`` with ``cov w = Q`` and ``cov v = diag(r)``. What was not observed
 is predicted and not corrected, and the outputs of a sample correct the state one after the other (Durbin and Koopman,
 Time Series Analysis by State Space Methods, chapters 4 and 6.4). F and H are sparse.
+
+It runs in two ways. Of one noise model the gains are kept, and turn any signals into innovations: the columns of a
+Jacobian. Of eight at once, side by side in lanes, one error has its innovations: what the sizes of disturbances are
+estimated from. The steps of the covariance are written once: of numbers, or of lanes.
 """
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from estimator.compiled import compiled, inlined
-from estimator.lanes import borrowed
+from estimator.lanes import as_lanes, borrowed, broadcast_as
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 SETTLED = 1e-5
@@ -24,12 +29,30 @@ class Terms(NamedTuple):
 
     rows: IntArray  # (K,)
     columns: IntArray  # (K,)
-    values: FloatArray  # (K,): entry ``[rows, columns]``
+    values: FloatArray  # (K,): entry ``[rows, columns]``; (K, L) of L noise models
+
+
+class StateSpace(NamedTuple):
+    """The model of an error: m states, C outputs, n inputs that were not read; of L noise models each (..., L)."""
+
+    f: Terms  # (m, m): how the state changes from sample to sample
+    h: Terms  # (C, m): how each output shows it
+    q: FloatArray  # (m m,): covariance of what drives the state
+    r: FloatArray  # (C,): variance of each reading
+    prior: FloatArray  # (m m,): covariance of the first state
+    at_input: FloatArray  # (n, m): how an input that was not read acts
+    share: FloatArray  # (n,): by what its variance in a sample is multiplied
+
+    def at(self, index: int) -> StateSpace:
+        """Return that of one of several noise models."""
+        f = self.f._replace(values=self.f.values[:, index].copy())
+        one = {name: getattr(self, name)[:, index].copy() for name in ("q", "r", "prior", "share")}
+        return self._replace(f=f, **one)
 
 
 def terms_of(matrix: FloatArray) -> Terms:
-    """Return the entries of a matrix that are not 0."""
-    rows, columns = np.nonzero(matrix)
+    """Return the entries of a matrix, shape (R, C) or (R, C, L), that are not 0."""
+    rows, columns = np.nonzero(matrix if matrix.ndim == 2 else matrix.any(axis=2))
     return Terms(rows, columns, matrix[rows, columns])
 
 
@@ -42,53 +65,77 @@ class Gains(NamedTuple):
 
 
 @inlined
-def correct(f: Terms, h: FloatArray, i: int, r: float, p: FloatArray, ph: FloatArray, gain: FloatArray) -> float:
-    """Correct a covariance by output i, fill the predictor's gain for it, and return its innovation's variance."""
-    m = h.shape[1]
-    s = float(r)
+def surprise(h: Terms, i: int, r: FloatArray, p: FloatArray, ph: FloatArray, m: int) -> float:
+    """Fill the covariance of the state and output i, shape (m,), and return the variance of its innovation."""
     for row in range(m):
-        total = 0.0
-        for k in range(m):
-            total += p[row, k] * h[i, k]
-        ph[i, row] = total
-        gain[i, row] = 0.0
-        s += h[i, row] * total
-    for n in range(f.values.size):
-        gain[i, f.rows[n]] += f.values[n] * ph[i, f.columns[n]] / s
-    for row in range(m):
-        for k in range(m):
-            p[row, k] -= ph[i, row] * ph[i, k] / s
-    return float(s)
+        ph[row] = broadcast_as(0.0, r[i])
+    for n in range(h.rows.size):
+        if h.rows[n] == i:
+            for row in range(m):
+                ph[row] = ph[row] + h.values[n] * p[h.columns[n] * m + row]
+    return r[i] + shown(h, i, ph)
 
 
 @inlined
-def shown_by(j: int, i: int, h: FloatArray, ph: FloatArray, s: FloatArray) -> float:
-    """Return how the innovation of output j moves the prediction of output i of the same sample."""
-    total = 0.0
-    for k in range(h.shape[1]):
-        total += h[i, k] * ph[j, k]
-    return float(total / s[j])
+def shown(h: Terms, i: int, x: FloatArray) -> float:
+    """Return what output i shows of a state."""
+    total = broadcast_as(0.0, x[0])
+    for n in range(h.rows.size):
+        if h.rows[n] == i:
+            total = total + h.values[n] * x[h.columns[n]]
+    return total
 
 
 @inlined
-def predict(f: Terms, q: FloatArray, p: FloatArray, half: FloatArray, before: FloatArray) -> bool:
-    """Move a covariance on by one sample; tell whether it no longer changes. ``before`` keeps the last variances."""
-    m = q.shape[0]
-    half[:] = 0.0
-    for n in range(f.values.size):
+def correct(p: FloatArray, ph: FloatArray, s: float, m: int) -> None:
+    """Correct a covariance by an output of which ``surprise`` told."""
+    for row in range(m):
+        gain = ph[row] / s
+        for k in range(row + 1):
+            p[row * m + k] = p[row * m + k] - gain * ph[k]
+            p[k * m + row] = p[row * m + k]
+
+
+@inlined
+def predict(f: Terms, q: FloatArray, p: FloatArray, half: FloatArray, m: int) -> None:
+    """Move a covariance on by one sample; both triangles are kept, so that each row is read in turn."""
+    for i in range(m * m):
+        half[i] = broadcast_as(0.0, q[i])
+    for n in range(f.rows.size):
         for k in range(m):
-            half[f.rows[n], k] += f.values[n] * p[f.columns[n], k]
+            half[f.rows[n] * m + k] = half[f.rows[n] * m + k] + f.values[n] * p[f.columns[n] * m + k]
+    for i in range(m * m):
+        p[i] = q[i]
+    for n in range(f.rows.size):
+        row, column = f.rows[n], f.columns[n]
+        for k in range(row, m):
+            p[k * m + row] = p[k * m + row] + f.values[n] * half[k * m + column]
+    for row in range(m):
+        for k in range(row):
+            p[k * m + row] = p[row * m + k]
+
+
+@inlined
+def add_inputs(at_input: FloatArray, share: FloatArray, unread: FloatArray, p: FloatArray, m: int) -> bool:
+    """Add the variances of the inputs that a sample, shape (n,), did not read; tell whether there are any."""
+    is_any = False
+    for n in range(unread.size):
+        if unread[n] > 0.0:
+            is_any = True
+            for i in range(m):
+                for k in range(m):
+                    p[i * m + k] = p[i * m + k] + at_input[n, i] * at_input[n, k] * unread[n] * share[n]
+    return is_any
+
+
+@inlined
+def is_steady(p: FloatArray, before: FloatArray, m: int) -> bool:
+    """Tell whether variances no longer change; ``before`` keeps the last ones."""
+    steady = True
     for i in range(m):
-        for k in range(m):
-            p[i, k] = q[i, k]
-    for n in range(f.values.size):
-        for k in range(m):
-            p[f.rows[n], k] += f.values[n] * half[k, f.columns[n]]
-    settled = True
-    for i in range(m):
-        settled = settled and abs(p[i, i] - before[i]) <= SETTLED * p[i, i]
-        before[i] = p[i, i]
-    return settled
+        steady = steady and abs(p[i * m + i] - before[i]) <= SETTLED * p[i * m + i]
+        before[i] = p[i * m + i]
+    return steady
 
 
 @inlined
@@ -100,81 +147,104 @@ def is_as_before(observed: BoolArray, t: int) -> bool:
     return same
 
 
-@inlined
-def add_input(at_input: FloatArray, n: int, variance: float, p: FloatArray) -> None:
-    """Add an input's variance in row n to a covariance of the state, in place."""
-    for i in range(p.shape[0]):
-        for k in range(p.shape[0]):
-            p[i, k] += variance * at_input[n, i] * at_input[n, k]
-
-
 @compiled
-def fill_gains(
-    f: Terms,
-    h: FloatArray,
-    q: FloatArray,
-    r: FloatArray,
-    prior: FloatArray,
-    observed: BoolArray,
-    at_input: FloatArray,
-    unread: FloatArray,
-    gains: Gains,
-) -> None:
-    """Fill the gains of a recording's filter; see ``fill_gains_in``, which needs no room of its own.
+def fill_gains(model: StateSpace, observed: BoolArray, unread: FloatArray, gains: Gains) -> None:
+    """Fill the gains of a recording's filter under one noise model.
 
-    ``q`` and ``r`` are the variances of state and readings, ``prior`` that of the first state, ``observed`` (N, C)
-    which outputs were read, ``at_input`` and ``unread`` how an input that was not read acts, and its variance in each
-    row.
+    ``observed``, shape (N, C), tells which outputs were read, ``unread``, shape (N, n), the variance of each input
+    before its share.
     """
-    count, m = h.shape
-    room = (np.empty((m, m)), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
-    fill_gains_in(f, h, q, r, prior.copy(), observed, at_input, unread, gains, room)
+    count, m = model.r.size, model.at_input.shape[1]
+    room = (np.empty(m * m), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
+    fill_gains_in(model, model.prior.copy(), observed, unread, gains, room)
 
 
 @compiled
 def fill_gains_in(
-    f: Terms,
-    h: FloatArray,
-    q: FloatArray,
-    r: FloatArray,
+    model: StateSpace,
     p: FloatArray,
     observed: BoolArray,
-    at_input: FloatArray,
     unread: FloatArray,
     gains: Gains,
     room: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> None:
     """Do what ``fill_gains`` does, from the covariance of the first state and with room for what it needs."""
-    f = Terms(borrowed(f.rows), borrowed(f.columns), borrowed(f.values))
-    h, q, p, observed = borrowed(h), borrowed(q), borrowed(p), borrowed(observed)
+    f = Terms(borrowed(model.f.rows), borrowed(model.f.columns), borrowed(model.f.values))
+    h = Terms(borrowed(model.h.rows), borrowed(model.h.columns), borrowed(model.h.values))
+    q, r, at_input, share = borrowed(model.q), borrowed(model.r), borrowed(model.at_input), borrowed(model.share)
+    p, observed, unread = borrowed(p), borrowed(observed), borrowed(unread)
     predictor, cross, spread = borrowed(gains.predictor), borrowed(gains.cross), borrowed(gains.spread)
-    half, ph, gain, before, s = (
-        borrowed(room[0]),
-        borrowed(room[1]),
-        borrowed(room[2]),
-        borrowed(room[3]),
-        borrowed(room[4]),
-    )
-    count, m = h.shape
+    half, ph, gain = borrowed(room[0]), borrowed(room[1]), borrowed(room[2])
+    before, s = borrowed(room[3]), borrowed(room[4])
+    count, m = r.size, at_input.shape[1]
     settled = False
     for t in range(observed.shape[0]):
         settled = settled and is_as_before(observed, t)
         is_any = False
         for i in range(count):
             if not settled:
-                s[i] = correct(f, h, i, r[i], p, ph, gain) if observed[t, i] else np.inf
+                s[i] = np.inf
+                if observed[t, i]:
+                    s[i] = surprise(h, i, r, p, ph[i], m)
+                    gain[i] = 0.0
+                    for n in range(f.rows.size):
+                        gain[i, f.rows[n]] += f.values[n] * ph[i, f.columns[n]] / s[i]
+                    correct(p, ph[i], s[i], m)
             is_any = is_any or observed[t, i]
-            spread[t, i] = np.sqrt(s[i])
+            spread[t, i] = sqrt(s[i])
             for k in range(m):
                 predictor[t, i, k] = gain[i, k] if observed[t, i] else 0.0
             for j in range(i):
-                cross[t, i, j] = shown_by(j, i, h, ph, s) if observed[t, i] and observed[t, j] else 0.0
+                cross[t, i, j] = shown(h, i, ph[j]) / s[j] if observed[t, i] and observed[t, j] else 0.0
         if not settled:
-            settled = predict(f, q, p, half, before) and is_any
-        for n in range(at_input.shape[0]):
-            if unread[t, n] > 0.0:
-                settled = False
-                add_input(at_input, n, unread[t, n], p)
+            predict(f, q, p, half, m)
+            settled = is_steady(p, before, m) and is_any
+        settled = not add_inputs(at_input, share, unread[t], p, m) and settled
+
+
+@compiled
+def innovate_each(
+    model: StateSpace,
+    observed: BoolArray,
+    unread: FloatArray,
+    error: FloatArray,
+    places: IntArray,
+    p: FloatArray,
+    room: tuple[FloatArray, FloatArray, FloatArray],
+    innovations: FloatArray,
+    variances: FloatArray,
+) -> None:
+    """Fill the innovations of one error, shape (R,), and their variances under noise models in lanes, (R, LANES).
+
+    ``places``, shape (C,), tells where each output's samples begin, ``p`` the covariance of the first state, which is
+    written over, and ``room`` is for a covariance and two states, each (..., LANES).
+    """
+    h = Terms(borrowed(model.h.rows), borrowed(model.h.columns), borrowed(model.h.values))
+    rows, columns, at_input = borrowed(model.f.rows), borrowed(model.f.columns), borrowed(model.at_input)
+    f, q, r = as_lanes(borrowed(model.f.values)), as_lanes(borrowed(model.q)), as_lanes(borrowed(model.r))
+    share, e, s = as_lanes(borrowed(model.share)), as_lanes(borrowed(innovations)), as_lanes(borrowed(variances))
+    covariance, half = as_lanes(borrowed(p)), as_lanes(borrowed(room[0]))
+    x, moved = as_lanes(borrowed(room[1])), as_lanes(borrowed(room[2]))
+    observed, unread, error, places = borrowed(observed), borrowed(unread), borrowed(error), borrowed(places)
+    m = at_input.shape[1]
+    for t in range(observed.shape[0]):
+        for i in range(observed.shape[1]):
+            if observed[t, i]:
+                row = places[i]
+                s[row] = surprise(h, i, r, covariance, moved, m)
+                e[row] = error[row] - shown(h, i, x)
+                correct(covariance, moved, s[row], m)
+                for k in range(m):
+                    x[k] = x[k] + moved[k] * (e[row] / s[row])
+                places[i] += 1
+        for k in range(m):
+            moved[k] = broadcast_as(0.0, r[0])
+        for n in range(rows.size):
+            moved[rows[n]] = moved[rows[n]] + f[n] * x[columns[n]]
+        for k in range(m):
+            x[k] = moved[k]
+        predict(Terms(rows, columns, f), q, covariance, half, m)
+        add_inputs(at_input, share, unread[t], covariance, m)
 
 
 @inlined

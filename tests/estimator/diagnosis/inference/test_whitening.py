@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from operator import itemgetter
 
@@ -15,13 +15,12 @@ from estimator.diagnosis.inference.disturbances import (
     Limits,
     LinearLine,
     Size,
-    Whitener,
+    Whitening,
     estimate,
     limits_for,
     line_of,
     readings,
     starts,
-    whitener,
 )
 from estimator.diagnosis.line.line import LASTS
 from estimator.physics.driveline import InitialCondition
@@ -42,14 +41,12 @@ def result() -> FitResult:
     return fit(make_problem(model(TWO_MASS), [record], ()))
 
 
-def of_one_output(
-    line: LinearLine, uses: Sequence[BoolArray], unread: Sequence[FloatArray] | None = None
-) -> Callable[[FloatArray], Whitener]:
-    """Return the filters of recordings of one output, by their noise model; all torques were read by default."""
+def of_one_output(line: LinearLine, uses: Sequence[BoolArray], unread: Sequence[FloatArray] | None = None) -> Whitening:
+    """Return the filters of recordings of one output; all torques were read by default."""
     ends = np.cumsum([0, *(int(use.sum()) for use in uses)])
     rows = [slice(first, last) for first, last in pairwise(ends)]
     unread = [np.zeros(use.size) for use in uses] if unread is None else unread
-    return partial(whitener, line, SAMPLE_TIME_S, [use[:, None] for use in uses], unread, rows)
+    return Whitening(line, SAMPLE_TIME_S, [use[:, None] for use in uses], unread, rows)
 
 
 def covariance(
@@ -97,9 +94,8 @@ def test_laws_are_off_by_a_share_of_what_they_change_by(result: FitResult) -> No
     line, changes = line_of(result), np.zeros((3, count))
     changes[0, 20:25], changes[1, 40:45], changes[2, 55:70] = 30.0, 50.0, 80.0
     signals = np.random.default_rng(4).standard_normal((count, 3))
-    filtered = whitener(
-        line, SAMPLE_TIME_S, [use[:, None]], [np.zeros(count)], [slice(0, count)], SIZES, changes=[changes]
-    )
+    whitening = Whitening(line, SAMPLE_TIME_S, [use[:, None]], [np.zeros(count)], [slice(0, count)], [changes])
+    filtered = whitening.filters(SIZES)
     lower = cholesky(covariance(line, SIZES, count, changes=changes), lower=True)
     np.testing.assert_allclose(filtered(signals), solve_triangular(lower, signals, lower=True), rtol=2e-4, atol=1e-4)
     assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
@@ -113,7 +109,7 @@ def test_innovations_are_those_of_the_covariance_written_out(result: FitResult, 
     line = line_of(result)
     signals = np.random.default_rng(2).standard_normal((int(use.sum()), 3))
     unread = np.where(np.isin(np.arange(count), missing), 900.0, 0.0)
-    filtered = of_one_output(line, [use], [unread])(SIZES)
+    filtered = of_one_output(line, [use], [unread]).filters(SIZES)
     lower = cholesky(covariance(line, SIZES, count, unread)[np.ix_(use, use)], lower=True)
     np.testing.assert_allclose(filtered(signals), solve_triangular(lower, signals, lower=True), rtol=2e-4, atol=1e-4)
     assert filtered.logs.sum() == pytest.approx(np.log(np.diag(lower)).sum(), abs=5e-4)
@@ -132,12 +128,32 @@ def test_the_sizes_that_made_an_error_are_found(result: FitResult, seed: int) ->
     limits = limits_for(result.problem.records, 0.05)
     limits = Limits(limits.usual, limits.low, limits.high + np.log(100.0))
     begun = starts(limits.usual, limits)
-    whitened = of_one_output(line, uses)
-    found, value = min((estimate(whitened, error, each, limits, 30) for each in begun), key=second)
-    _, from_the_truth = estimate(whitened, error, true, limits, 30)
+    whitening = of_one_output(line, uses)
+    found, value = min((estimate(whitening, error, each, limits, 30) for each in begun), key=second)
+    _, from_the_truth = estimate(whitening, error, true, limits, 30)
     assert value < from_the_truth + 2.0
     for size in (Size.WHITE, Size.WALK):
         assert found[size] == pytest.approx(true[size], abs=0.35)
-    innovations = whitened(found)(error)
+    innovations = whitening.filters(found)(error)
     assert np.mean(innovations**2) == pytest.approx(1.0, abs=0.05)
     assert abs(innovations[1:] @ innovations[:-1]) / innovations.size < 0.05
+
+
+@pytest.mark.parametrize("count", [1, 8, 11])
+def test_noise_models_side_by_side_are_each_as_alone(result: FitResult, count: int) -> None:
+    rng = np.random.default_rng(count)
+    use: BoolArray = rng.random((300, 2)) > 0.1  # of two outputs, each with samples of its own that were not read
+    use[40:60] = False
+    line = line_of(result)
+    line = replace(line, h=np.vstack([line.h, [0.0, 0.0, 1.0]]))
+    changes = np.where(rng.random((3, 300)) > 0.9, 20.0, 0.0)
+    unread = np.where(use.any(axis=1), 0.0, 400.0)
+    rows = [np.arange(np.count_nonzero(use))]
+    whitening = Whitening(line, SAMPLE_TIME_S, [use], [unread], rows, [changes])
+    sizes = np.append(SIZES, np.log([0.1, 0.02, 0.1])) + 0.3 * rng.standard_normal((count, 11))
+    error = rng.standard_normal(rows[0].size)
+    found = whitening.innovations(error, sizes)
+    for values, logs, each in zip(found.values, found.logs, sizes, strict=True):
+        alone = whitening.filters(each)
+        np.testing.assert_allclose(values, alone(error), rtol=1e-4, atol=1e-4)  # a gain that is held: `SETTLED`
+        np.testing.assert_allclose(logs, alone.logs, rtol=1e-4, atol=1e-4)
