@@ -8,7 +8,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from estimator.physics.driveline import EffectValue, Structure
-from estimator.physics.effect import Effect
+from estimator.physics.effect import MOMENTS, Effect
 from estimator.physics.effects import drag, dry_friction, inertia, load, sensor, shaft, timing, torque
 from estimator.physics.own_law import LawName
 from estimator.physics.tables import PREFIX, TABLES, table_faults, table_of
@@ -149,11 +149,18 @@ def _limit_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[st
     problems = []
     for parameter in entry.parameters:
         value = values[parameter.name].value if parameter.name in values else parameter.null
-        least = "greater than 0" if parameter.low > 0 and parameter.null > 0 else "0 or greater"
+        low = 0.0 if parameter.low >= 0 else parameter.least
+        is_open = parameter.low > 0 and parameter.null > 0
+        least = "greater than 0" if is_open else f"{low:g} or greater"
         allowed = least if math.isinf(parameter.most) else f"{least}, up to {parameter.most:g}"
-        too_small = value < 0 <= parameter.low or (value == 0 and least == "greater than 0")
-        if too_small or value > parameter.most:
+        if value < low or (is_open and value == 0) or value > parameter.most:
             problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {allowed}, got {value}")
+    begins, ends = (values[each.name].value if each.name in values else 0.0 for each in MOMENTS)
+    if entry.event and ends < begins:
+        problems.append(
+            f"effects.{entry.name}.{MOMENTS[1].name}.value: expected a moment after {MOMENTS[0].name} = {begins:g}, "
+            f"when it begins, got {ends}"
+        )
     return problems
 
 

@@ -99,7 +99,8 @@ class EffectParameter:
     meaning: str  # one line for people
     optional: bool = False  # true where a model file may leave it out
     own: bool = False  # true where each recording has its own value, which no model file holds
-    most: float = math.inf  # largest value that makes sense in a model, whatever the data
+    least: float = -math.inf  # smallest value that makes sense in a model, whatever the data
+    most: float = math.inf  # largest such value
     form: str = ""  # name of the law's form where this parameter shapes it
     outlasts: bool = False  # true of an own one that continues from one recording to the next: none before the first
 

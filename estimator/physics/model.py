@@ -103,6 +103,7 @@ class DrivelineModel:
         problems += part_problems(self.has, self.effects)
         if not isinstance(self.load, Load) and not math.isfinite(self.load):
             problems.append(f"load.constant: expected 'own', 'shared' or a finite number, got {self.load}")
+        problems = problems or self._left_over_problems()
         if problems:
             raise BadModel("\n".join(problems))
 
@@ -129,6 +130,25 @@ class DrivelineModel:
             for name, values in self.effects.items()
             for problem in effect_problems(name, values, self.structure, self.laws)
         ]
+
+    def _left_over_problems(self) -> list[str]:
+        """Refuse effects that leave nothing of a parameter that no line is without, such as its inertia."""
+        line = self.values()
+        return [
+            f"effects.{name}: expected values that leave {parameter} = {line[parameter]:g} greater than 0, got "
+            f"{', '.join(f'{key} = {each.value:g}' for key, each in values.items())}, which leave {min(spans):g}"
+            for name, values in self.effects.items()
+            for parameter, spans in self._spans_with(name, values, line).items()
+            if parameter in STRICTLY_POSITIVE and min(spans) <= 0.0
+        ]
+
+    def _spans_with(
+        self, name: str, values: Mapping[str, EffectValue], line: Mapping[str, float]
+    ) -> dict[str, list[float]]:
+        """Return between what an effect has the line's parameters, by name."""
+        given = {each.name: each.null for each in EFFECTS[name].parameters} | {k: v.value for k, v in values.items()}
+        described = EFFECTS[name].described(self, EFFECTS[name].completed(given), line)
+        return {parameter: [end for span in spans for end in span] for parameter, spans in described.items()}
 
     def _prior_problems(self) -> list[str]:
         known = ", ".join([*EFFECTS, *self.laws])

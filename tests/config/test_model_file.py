@@ -264,24 +264,25 @@ def parameters(draw: st.DrawFn) -> Parameter:
 
 
 @st.composite
+def effects_of(draw: st.DrawFn, name: str) -> dict[str, EffectValue]:
+    pairs = st.tuples(finite, finite).map(lambda pair: (min(pair), max(pair)))
+    parameters = EFFECTS[name].parameters
+    values = {each.name: min(draw(finite), each.most) for each in parameters}
+    if EFFECTS[name].event:
+        values["from_s"], values["to_s"] = sorted([values["from_s"], values["to_s"]])
+    return {key: EffectValue(value, draw(st.none() | pairs)).at(value) for key, value in values.items()}
+
+
+@st.composite
 def models(draw: st.DrawFn) -> DrivelineModel:
     structure = draw(st.sampled_from(Structure))
     fitting = sorted(name for name, entry in EFFECTS.items() if structure in entry.structures)
-    pairs = st.tuples(finite, finite).map(lambda pair: (min(pair), max(pair)))
     chosen = draw(st.lists(st.sampled_from(fitting), unique=True, max_size=3))
     return DrivelineModel(
         structure=structure,
         motion=draw(st.sampled_from(Motion)),
         parameters={name: draw(parameters()) for name in structure.parameter_names},
-        effects={
-            name: {
-                parameter.name: EffectValue(value := min(draw(finite), parameter.most), draw(st.none() | pairs)).at(
-                    value
-                )
-                for parameter in EFFECTS[name].parameters
-            }
-            for name in chosen
-        },
+        effects={name: draw(effects_of(name)) for name in chosen},
         gear_ratio=draw(st.none() | finite),
         load=draw(st.sampled_from(Load) | finite),
         has=draw(st.none() | st.just(frozenset(PARTS))),

@@ -289,7 +289,7 @@ WARMING_FRICTION = Effect(
         EffectParameter("cold_nm_s", "damping", 0.0, 0.0, 60.0, "friction that goes away: b_cold"),
         EffectParameter("time_constant_s", "s", 1.0, 0.02, 10.0, "time constant of warming: tau"),
         EffectParameter(
-            "warm", "", 0.0, 0.0, 1.0, "share gone at its start: h_0, of each recording", True, True, outlasts=True
+            "warm", "", 0.0, 0.0, 1.0, "share gone as a recording begins: h_0", True, True, most=1, outlasts=True
         ),
     ),
     acting=Acting(Place.LOAD_DAMPING, warming_law),

@@ -200,7 +200,7 @@ STIFFNESS_NONLINEARITY = Effect(
     parameters=(
         EffectParameter("hardening_per_rad2", "per_angle_squared", 0.0, -200.0, 200.0, "relative stiffness change h"),
         EffectParameter("shape", "", 1.0, 0.1, 3.0, "how the change continues at large twist: m", True),
-        EffectParameter("stage_share", "", 0.0, -1.0, 10.0, "stiffness that a second stage adds, over k: s", True),
+        EffectParameter("stage_share", "", 0.0, -1.0, 10.0, "stiffness a second stage adds, over k: s", True, least=-1),
         EffectParameter("stage_rad", "angle", 0.0, 0.02, 1.0, "twist from which on it is loaded: e_2", True),
     ),
     acting=Acting(Place.SPRING, spring_law),

@@ -151,7 +151,7 @@ TORQUE_DERATING = Effect(
         EffectParameter("time_constant_s", "s", 1.0, 0.02, 10.0, "time constant of the decay: tau"),
         EffectParameter("heating_nm", "torque", 0.0, 0.0, 10.0, "torque that leads to the loss d: T_n", True),
         EffectParameter(
-            "warm", "", 0.0, 0.0, 1.0, "share of d at its start: h_0, of each recording", True, True, outlasts=True
+            "warm", "", 0.0, 0.0, 1.0, "share of d as a recording begins: h_0", True, True, most=1, outlasts=True
         ),
     ),
     structures=EVERY_LINE,

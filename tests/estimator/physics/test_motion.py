@@ -118,6 +118,26 @@ def test_every_fault_is_reported_at_once() -> None:
             {"backlash": {"gap_rad": 0.02, "pull": 1.5}},
             "effects.backlash.pull.value: expected a number 0 or greater, up to 1, got 1.5",
         ),
+        (
+            {"warming_friction": {"cold_nm_s": 1.0, "time_constant_s": 5.0, "warm": 2.0}},
+            "effects.warming_friction.warm.value: expected a number 0 or greater, up to 1, got 2.0",
+        ),
+        (
+            {"stiffness_nonlinearity": {"hardening_per_rad2": 0.0, "stage_share": -2.0, "stage_rad": 0.05}},
+            "effects.stiffness_nonlinearity.stage_share.value: expected a number -1 or greater, got -2.0",
+        ),
+        (
+            {"brake_drag": {"brake_nm": 5.0, "from_s": 4.0, "to_s": 3.0}},
+            "effects.brake_drag.to_s.value: expected a moment after from_s = 4, when it begins, got 3.0",
+        ),
+        (
+            {"inertia_change": {"change_kg_m2": -TWO_MASS["J_L"]}},
+            "effects.inertia_change: expected values that leave J_L = .* greater than 0, got change_kg_m2 = .* leave 0",
+        ),
+        (
+            {"stiffness_change": {"change": -2.0}},
+            "effects.stiffness_change: expected values that leave k = .* greater than 0, got change = -2, which leave -",
+        ),
     ],
 )
 def test_a_wrong_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
