@@ -1,9 +1,8 @@
 """The first use on a machine: the simulation has yet to be compiled there, once.
 
-A compiler works on one core, so two processes share the kernels. What calls a kernel takes its code in from where it is
-kept on disk: first each process compiles a kernel that calls no other, then each a caller. What is quickly compiled
-fills the time of the one that would be done first. numba writes a function when all of it is compiled: a process that
-is killed loses the one it was at.
+A compiler works on one core, so two processes share the kernels; what is quickly compiled fills the time of the one
+that would be done first. No compiled function calls a kernel: it would take all of its code in once more. numba writes
+a function when all of it is compiled: a process that is killed loses the one it was at.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from estimator.diagnosis.line.equivalent import Filtered, run_filter, run_smooth
 from estimator.least_squares import least
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel.integration import integrate
-from estimator.physics.kernel.side_by_side import integrate_each, integrate_side_by_side
+from estimator.physics.kernel.side_by_side import integrate_side_by_side
 from estimator.physics.layout import Grid, flat
 from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES, simulate
@@ -42,11 +41,8 @@ _NOTHING: Any = _JOINED(())
 _EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
 _FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
-SIDE_BY_SIDE: tuple[tuple[tuple[Any, ...], tuple[Any, ...]], ...] = (
-    ((integrate,), (integrate_side_by_side, least)),
-    ((integrate_each,), (run_filter, run_smoother)),
-)
-"""What one process compiles while the other does, callers last."""
+SIDE_BY_SIDE: tuple[tuple[Any, ...], ...] = ((integrate,), (integrate_side_by_side, least, run_filter, run_smoother))
+"""What one process compiles while the other does."""
 
 
 def compiled(model: DrivelineModel, records: Sequence[Record], progress: Progress) -> Progress:
@@ -68,12 +64,8 @@ def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
     inertias, own = _TUPLE(int64, masses), _NOTHING
     steps = (float64, int64, float64)
     return {
-        integrate: (
-            *(inertias, own, *steps, int64, int64, float64),
-            *(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _INDICES, boolean, _ROWS, _ROWS),
-        ),
+        integrate: (inertias, own, *steps, int64, int64, float64, _INDICES, *_EACH, _STACK),
         integrate_side_by_side: (inertias, *steps, int64, float64, _INDICES, *_EACH),
-        integrate_each: (inertias, own, *steps, float64, *_EACH, _STACK, _INDICES),
         least: (_ROWS, _ROW, _ROW, _ROW, int64, int64),
         run_filter: (_ROWS, _ROW, float64, float64, _ROWS, _ROW, boolean[::1], _FILTERED),
         run_smoother: (_ROWS, _ROW, _FILTERED, _ROW, _ROW),
@@ -86,13 +78,14 @@ def is_first_use(masses: int) -> bool:
 
 
 def _marker(masses: int) -> Path:
-    dispatcher: Any = integrate_each
+    dispatcher: Any = integrate_side_by_side
     return Path(dispatcher.stats.cache_path) / f"compiled_for_{masses}"
 
 
 def compile_kernels(masses: int) -> None:
     """Compile the largest kernels in two processes and keep them on disk; what fails there is compiled when called."""
-    for some, others in SIDE_BY_SIDE if sys.executable else ():
+    if sys.executable:
+        some, others = SIDE_BY_SIDE
         with _compiling(masses, some), _compiling(masses, others):
             pass
     _marker(masses).parent.mkdir(parents=True, exist_ok=True)

@@ -107,6 +107,6 @@ def test_a_sealed_rig_runs_nothing_of_the_folder(trapped: Path) -> None:
 
 @pytest.mark.campaign
 def test_compiling_runs_nothing_of_the_folder(trapped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(first_use, "SIDE_BY_SIDE", (((), ()),))
+    monkeypatch.setattr(first_use, "SIDE_BY_SIDE", ((), ()))
     first_use.compile_kernels(2)
     assert not (trapped / RAN).exists()

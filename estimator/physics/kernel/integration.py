@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from estimator.compiled import compiled, compiled_with_lock, inlined, ir_inlined
 from estimator.lanes import borrowed
 from estimator.physics.curve import steepest
@@ -27,9 +29,9 @@ from estimator.physics.kernel.conditions import (
 )
 from estimator.physics.kernel.laws_at import is_waving
 from estimator.physics.kernel.linear import (
+    RESPONSES,
     WORTHWHILE_SAMPLES,
-    StepResponses,
-    answers,
+    fill_responses,
     has_dry_friction,
     is_linear,
     next_linear_state,
@@ -43,6 +45,7 @@ from estimator.physics.kernel.state_vector import (
     FILTERED,
     LAG_RISE,
     LAGGED,
+    STATES,
     Bristles,
     Conditions,
     State,
@@ -190,7 +193,7 @@ def leave_slope(k: int, slope: float, slopes: FloatArray) -> None:
 def next_state_with_friction(
     line: Line,
     summing: bool,
-    to: StepResponses,
+    to: FloatArray,
     now: Conditions,
     torque: float,
     rise: float,
@@ -248,7 +251,7 @@ def integrate_made(  # one question more than usual, and a change costs each use
     filtered, filter_rise = state[FILTERED], state[FILTER_RISE]
     bristles = Bristles(state[BRISTLES_MOTOR], state[BRISTLES_LOAD])
     now = conditions(line.masses, start_s + first * sample_time_s, h, 0.0, 0.0, sign_width, p)
-    to, read = answers(line, now, p, h, 0), False
+    to, read = np.empty((RESPONSES, STATES)), False
     for k in range(first, last):
         turn = angle[k + 1] - angle[k] if k + 1 < angle.shape[0] else angle[k] - angle[k - 1]
         for i in range(outputs.shape[0]):
@@ -263,7 +266,7 @@ def integrate_made(  # one question more than usual, and a change costs each use
             now = with_torques(now, now.torque, load[k])
         summing = linear and not varying
         if summing and not read:
-            to = answers(line, now, p, h, leap)
+            fill_responses(line, now, p, h, leap, to)
         read = summing
         for j in range(0, substeps, leap if summing else 1):
             if varying:
@@ -298,8 +301,11 @@ def integrate(
     first: int,
     last: int,
     start_s: float,
+    rows: IntArray,
     torque: FloatArray,
     load: FloatArray,
+    fed_by: IntArray,
+    loaded_by: IntArray,
     angle: FloatArray,
     followed: FloatArray,
     p: FloatArray,
@@ -311,26 +317,42 @@ def integrate(
 ) -> None:
     """Simulate samples ``first`` to ``last``, without this one; as an observer of the readings that are ``followed``.
 
-    Column k of ``out`` is the states' entries before torque k acts.
+    Some rows of ``p``, ``state``, ``out`` and ``slopes``, one after the other: row i is driven by the rows
+    ``fed_by[i]`` of ``torque`` and ``loaded_by[i]`` of ``load``. Column k of its outputs, shape (C, N), is the states'
+    entries before torque k acts.
     """
-    given = (
-        sample_time_s,
-        substeps,
-        sign_width,
-        first,
-        last,
-        start_s,
-        borrowed(torque),
-        borrowed(load),
-        borrowed(angle),
-        borrowed(followed),
-        borrowed(p),
-    )
-    given_back = (borrowed(state), borrowed(outputs), sensor, borrowed(out), borrowed(slopes))
-    call_specialised(len(masses), own, integrate_made, borrowed(p), (*given, *given_back))
+    rows, fed_by, loaded_by, outputs = borrowed(rows), borrowed(fed_by), borrowed(loaded_by), borrowed(outputs)
+    torque, load, angle, followed = borrowed(torque), borrowed(load), borrowed(angle), borrowed(followed)
+    p, state, out, slopes = borrowed(p), borrowed(state), borrowed(out), borrowed(slopes)
+    steps = (sample_time_s, substeps, sign_width, first, last, start_s)
+    for row in rows:
+        driven = (torque[fed_by[row]], load[loaded_by[row]], angle, followed, p[row], state[row])
+        found = (outputs, sensor, out[row], slopes[row])
+        call_specialised(len(masses), own, integrate_made, p[row], (*steps, *driven, *found))
 
 
 @compiled_with_lock
-def integrate_period(*given: Any) -> None:
-    """Do what ``integrate`` does, with its arguments, for a rig that is stepped period by period."""
-    integrate(*given)
+def integrate_period(
+    masses: Masses,
+    own: tuple[Any, ...],
+    sample_time_s: float,
+    substeps: int,
+    sign_width: float,
+    first: int,
+    last: int,
+    start_s: float,
+    torque: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    followed: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    outputs: IntArray,
+    sensor: bool,
+    out: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Do what ``integrate`` does for one line, for a rig that is stepped period by period."""
+    steps = (sample_time_s, substeps, sign_width, first, last, start_s)
+    driven, found = (torque, load, angle, followed, p, state), (outputs, sensor, out, slopes)
+    call_specialised(len(masses), own, integrate_made, p, (*steps, *driven, *found))

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import numpy as np
 
-from estimator.compiled import compiled, inlined
+from estimator.compiled import inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.kernel.conditions import Line, is_bristled, is_bristled_at_motor, with_friction, with_torques
 from estimator.physics.kernel.laws_at import (
@@ -27,13 +24,13 @@ from estimator.physics.kernel.state_vector import (
     MIDDLE_SPEED,
     MIDDLE_TWIST,
     SPEED,
-    STATES,
     TWIST,
     Conditions,
     State,
+    pack,
     unpacked,
+    unpacked_row,
 )
-from estimator.physics.kernel.written import several, written
 from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
 from estimator.physics.tables import TABLES
@@ -41,9 +38,13 @@ from estimator.signals.record import FloatArray
 
 FED_OR_LOADED = ("table_torque", "table_load_angle")  # curves that change a torque from outside, and no line
 
-NONE = -1  # no entry of the state
+TO_TORQUE, TO_RISE, TO_LOAD = range(FIRST_LAW + LAW_STATES, FIRST_LAW + LAW_STATES + 3)
+"""Rows of the responses to a torque, behind those to the entries of the state."""
 
-WORTHWHILE_SAMPLES = 50  # samples from which on reading the answers takes less time than they save
+RESPONSES = TO_LOAD + 1
+"""How many there are."""
+
+WORTHWHILE_SAMPLES = 50  # samples from which on working the responses out takes less time than they save
 
 _OTHERS = [(entry.name, each) for entry in BUILT_IN.values() if not entry.linear for each in entry.parameters]
 _OTHERS += [(entry.name, entry.parameters[0]) for entry in TABLES.values() if entry.name not in FED_OR_LOADED]
@@ -51,23 +52,6 @@ BENDING = np.array([slot(effect, parameter.name) for effect, parameter in _OTHER
 NULLS = np.array([parameter.null for _, parameter in _OTHERS])
 """Where the parameters of all effects stand that leave no line linear, and what each is where its effect is not there:
 with one of them a line takes its sub-steps."""
-
-
-class StepResponses(NamedTuple):
-    """The state to which a unit of each entry of the state, and of each torque, leads a line at rest."""
-
-    angle: State  # to one unit of the entry of that name [unit of the state / unit of the entry]
-    speed: State  # to a unit of the motor's speed
-    twist: State  # ... of the first shaft's twist
-    load_speed: State  # ... of the load's speed
-    branch_twist: State  # ... of the extra mode's twist
-    branch_speed: State  # ... and speed
-    middle_twist: State  # ... of the second shaft's twist
-    middle_speed: State  # ... of the middle mass's speed
-    torque: State  # to 1 Nm at the motor over the whole step
-    rise: State  # to a torque that rises from 0 to 1 Nm over the step
-    load: State  # to 1 Nm at the load over the whole step
-    law_states: tuple[State, ...]  # to a unit of each law's own state
 
 
 @inlined
@@ -108,60 +92,30 @@ def is_beyond(begun: float, ended: float, limit: float) -> bool:
 
 
 @inlined
-def unit(entry: int) -> State:
-    """Return the state whose entry of this number is 1 and whose others are 0; no entry: that at rest."""
-    state = np.zeros(STATES)
-    if entry >= 0:
-        state[entry] = 1.0
-    return unpacked(state)
+def fill_responses(line: Line, now: Conditions, p: FloatArray, h: float, steps: int, to: FloatArray) -> None:
+    """Fill to which state ``steps`` sub-steps of ``h`` [s] lead a line at rest, shape (RESPONSES, STATES).
 
-
-@compiled
-def answers(line: Line, now: Conditions, p: FloatArray, h: float, steps: int) -> StepResponses:
-    """Return what ``steps`` sub-steps of ``h`` [s] make of each unit of a state and a torque, without dry friction."""
+    A row for a unit of each entry of the state, and of each torque [Nm]: at the motor, one that rises from 0 over the
+    step, and at the load. Without dry friction.
+    """
     now = with_friction(now, 0.0, 0.0, 0.0, 0.0, 0.0)
-    pulled = with_torques(now, 0.0, 1.0)
-    return StepResponses(
-        after(line, now, 0.0, 0.0, unit(ANGLE), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(SPEED), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(TWIST), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(LOAD_SPEED), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(BRANCH_TWIST), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(BRANCH_SPEED), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(MIDDLE_TWIST), p, h, steps),
-        after(line, now, 0.0, 0.0, unit(MIDDLE_SPEED), p, h, steps),
-        after(line, now, 1.0, 0.0, unit(NONE), p, h, steps),
-        after(line, now, 0.0, 1.0, unit(NONE), p, h, steps),
-        after(line, pulled, 0.0, 0.0, unit(NONE), p, h, steps),
-        of_law_states(line, now, p, h, steps),
-    )
-
-
-@compiled
-def after(
-    line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float, steps: int
-) -> State:
-    """Return the state after ``steps`` sub-steps of ``h`` [s] under one torque of this mean and rise [Nm]."""
-    for _ in range(steps):
-        x = runge_kutta(line, now, torque, rise, x, p, h)
-    return x
-
-
-of_law_states: Callable[..., tuple[State, ...]] = written(
-    "of_law_states",
-    {"line": Line, "now": Conditions, "p": FloatArray, "h": float, "steps": int},
-    tuple[State, ...],
-    [f"return {several(f'after(line, now, 0.0, 0.0, unit({FIRST_LAW + i}), p, h, steps)' for i in range(LAW_STATES))}"],
-    {"__name__": __name__, "after": after, "unit": unit},
-)
-"""What ``steps`` sub-steps of ``h`` [s] make of a unit of each law's own state."""
+    for row in range(RESPONSES):
+        to[row] = 0.0
+        if row < TO_TORQUE:
+            to[row, row] = 1.0
+        felt = with_torques(now, 0.0, 1.0 if row == TO_LOAD else 0.0)
+        torque, rise = 1.0 if row == TO_TORQUE else 0.0, 1.0 if row == TO_RISE else 0.0
+        x = unpacked(to[row])
+        for _ in range(steps):
+            x = runge_kutta(line, felt, torque, rise, x, p, h)
+        pack(x, to[row])
 
 
 @inlined
 def next_linear_state(
     line: Line,
     summing: bool,
-    to: StepResponses,
+    to: FloatArray,
     now: Conditions,
     torque: float,
     rise: float,
@@ -169,18 +123,16 @@ def next_linear_state(
     p: FloatArray,
     h: float,
 ) -> State:
-    """Return the state that follows on ``x``: the sum of the answers where that is asked for and right, else a step."""
+    """Return the state that follows on ``x``: the sum of responses where that is asked for and right, else a step."""
     if summing:
-        after = answered(line, to, now, torque, rise, x, p)
+        after = summed(line, to, now, torque, rise, x, p)
         if kept_friction(line, now, x, after):
             return after
     return stepped(line, now, torque, rise, x, p, h)
 
 
 @inlined
-def answered(
-    line: Line, to: StepResponses, now: Conditions, torque: float, rise: float, x: State, p: FloatArray
-) -> State:
+def summed(line: Line, to: FloatArray, now: Conditions, torque: float, rise: float, x: State, p: FloatArray) -> State:
     """Return the state that follows on ``x`` under a torque of this mean and rise [Nm] and full dry friction."""
     carried = x.speed if line.masses == 1 else x.load_speed
     torque += now.torque
@@ -188,21 +140,21 @@ def answered(
         torque -= dry_friction(x.speed, now.dry_motor, now.width_motor)
     load = now.load + dry_at_load(carried, now)
     after = State(0.0, 0.0, 0.0, 0.0, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, no_states(0.0))
-    after = advanced(line, after, to.torque, torque)
-    after = advanced(line, after, to.load, load)
+    after = advanced(line, after, unpacked_row(to, TO_TORQUE), torque)
+    after = advanced(line, after, unpacked_row(to, TO_LOAD), load)
     if rise != 0.0:
-        after = advanced(line, after, to.rise, rise)
-    after = advanced(line, after, to.angle, x.angle)
-    after = advanced(line, after, to.speed, x.speed)
+        after = advanced(line, after, unpacked_row(to, TO_RISE), rise)
+    after = advanced(line, after, unpacked_row(to, ANGLE), x.angle)
+    after = advanced(line, after, unpacked_row(to, SPEED), x.speed)
     if line.masses > 1:
-        after = advanced(line, after, to.twist, x.twist)
-        after = advanced(line, after, to.load_speed, x.load_speed)
+        after = advanced(line, after, unpacked_row(to, TWIST), x.twist)
+        after = advanced(line, after, unpacked_row(to, LOAD_SPEED), x.load_speed)
     if line.masses == 3:
-        after = advanced(line, after, to.middle_twist, x.middle_twist)
-        after = advanced(line, after, to.middle_speed, x.middle_speed)
+        after = advanced(line, after, unpacked_row(to, MIDDLE_TWIST), x.middle_twist)
+        after = advanced(line, after, unpacked_row(to, MIDDLE_SPEED), x.middle_speed)
     if line.extended:
-        after = advanced(line, after, to.branch_twist, x.branch_twist)
-        after = advanced(line, after, to.branch_speed, x.branch_speed)
+        after = advanced(line, after, unpacked_row(to, BRANCH_TWIST), x.branch_twist)
+        after = advanced(line, after, unpacked_row(to, BRANCH_SPEED), x.branch_speed)
         for i in range(LAW_STATES):
-            after = advanced(line, after, to.law_states[i], x.law_states[i])
+            after = advanced(line, after, unpacked_row(to, FIRST_LAW + i), x.law_states[i])
     return after

@@ -40,6 +40,10 @@ from estimator.signals.record import FloatArray
 
 PARTS = 8  # steps that are taken in place of one
 
+STAGES = 4
+"""Of the classical Runge-Kutta method. Each begins with the slope of the one before it; that of the first counts for
+nothing."""
+
 DEPTHS, FAST = 4.0, 0.25
 """Depths of contact, ``e_c``, beyond the edge of a gap in which its damping sets in, where a step covers this share of
 one: the damping is smooth, but not over such a step."""
@@ -328,18 +332,17 @@ def advanced(line: Line, x: State, dx: State, h: float) -> State:
 
 @inlined
 def runge_kutta(line: Line, now: Conditions, torque: float, rise: float, x: State, p: FloatArray, h: float) -> State:
-    """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm]."""
-    begin = with_torque(now, torque - 0.5 * rise)
-    middle = with_torque(now, torque)
-    end = with_torque(now, torque + 0.5 * rise)
-    first = rates(line, begin, x, p)
-    second = rates(line, middle, advanced(line, x, first, 0.5 * h), p)
-    third = rates(line, middle, advanced(line, x, second, 0.5 * h), p)
-    fourth = rates(line, end, advanced(line, x, third, h), p)
-    x = advanced(line, x, first, h / 6.0)
-    x = advanced(line, x, second, h / 3.0)
-    x = advanced(line, x, third, h / 3.0)
-    return advanced(line, x, fourth, h / 6.0)
+    """Return the state after one sub-step under constant conditions and a torque of this mean and rise [Nm].
+
+    The stages are a loop, so that the laws are compiled once and not four times.
+    """
+    after, dx, sixth, third = x, x, h / 6.0, h / 3.0
+    for stage in range(STAGES):
+        within = 0 < stage < STAGES - 1
+        node = 0.5 if within else 1.0 if stage > 0 else 0.0
+        dx = rates(line, with_torque(now, torque + (node - 0.5) * rise), advanced(line, x, dx, node * h), p)
+        after = advanced(line, after, dx, third if within else sixth)
+    return after
 
 
 @inlined

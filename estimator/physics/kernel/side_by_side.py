@@ -62,7 +62,7 @@ def can_share_lanes(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
     return leading_compatible(p, rows) == rows.size
 
 
-@inlined
+@compiled
 def leading_compatible(p: FloatArray, rows: IntArray) -> int:
     """Return how many of the lines, a row of parameters each, are kin of the first before one is not."""
     count = 1
@@ -71,7 +71,7 @@ def leading_compatible(p: FloatArray, rows: IntArray) -> int:
     return count
 
 
-@inlined
+@compiled
 def compatible_together(p: FloatArray) -> IntArray:
     """Return the rows of some lines in an order that has those that are kin follow each other."""
     order, placed = np.empty(p.shape[0], dtype=np.int64), np.zeros(p.shape[0], dtype=np.bool_)
@@ -250,13 +250,15 @@ def integrate_side_by_side(
     followed = borrowed(followed)
     fed_by, loaded_by, outputs = borrowed(fed_by), borrowed(loaded_by), borrowed(outputs)
     p, state, out = borrowed(p), borrowed(state), borrowed(out)
-    count = outputs.shape[0]
+    count, finest = outputs.shape[0], substeps
+    for row in rows:
+        finest = max(finest, with_mode(substeps, sample_time_s, p[row]))
     values = np.empty((torque.shape[1] * count, LANES))
-    mean, rise = supplied_lanes(sample_time_s, substeps, first, start_s, rows, torque, fed_by, p, state)
+    mean, rise = supplied_lanes(sample_time_s, finest, first, start_s, rows, torque, fed_by, p, state)
     loads = in_lanes(load, loaded_by[rows])
-    given = (sample_time_s, substeps, sign_width, first, start_s, mean, rise, loads, angle, followed)
+    given = (sample_time_s, finest, sign_width, first, start_s, mean, rise, loads, angle, followed)
     filtering = sensor and p[rows[0], slots.FILTER] > 0.0
-    them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / substeps))
+    them = (in_lanes(p, rows), in_lanes(state, rows), low_passes(rows, p, sample_time_s / finest))
     call_specialised(len(masses), (), advance, p[rows[0]], (*given, p[rows[0]], *them, outputs, filtering, values))
     for lane in range(rows.size):
         own = p[rows[lane]]
@@ -266,7 +268,6 @@ def integrate_side_by_side(
                 out[rows[lane], i, k] = shown(value, angle[k], value, own) if sensor and i == 0 else value
 
 
-@compiled
 def integrate_each(
     masses: Masses,
     own: tuple[Any, ...],
@@ -288,46 +289,39 @@ def integrate_each(
     slopes: FloatArray,
     alike: IntArray,
 ) -> None:
-    """Do what ``integrate`` does for every row of ``p``, ``state``, ``out`` and ``slopes``.
+    """Do what ``integrate`` does for every row, from the start.
 
-    Of shape (K, C, N) is ``out``: N samples of C outputs. Row i is driven by the rows ``fed_by[i]`` of ``torque`` and
-    ``loaded_by[i]`` of ``load``. It is as row 0 before sample ``alike[i]`` and is simulated from about there on;
-    ``alike[0]`` is the number of samples. Rows that are kin go side by side where they can, and leave their states as
-    they were.
+    Of shape (K, C, N) is ``out``: N samples of C outputs. Row i is as row 0 before sample ``alike[i]`` and is simulated
+    from about there on; ``alike[0]`` is the number of samples. Rows that are kin go side by side where they can, and
+    leave their states as they were.
+
+    It is not compiled: that would take the code of both kernels in, and work on it once more for minutes.
     """
-    given = (sample_time_s, substeps, sign_width)
-    all_differ = not np.any(alike[1:])
-    order = compatible_together(p) if all_differ else 1 + np.argsort(alike[1:])
-    samples, reached, i = torque.shape[1], 0, 0
-    while i < order.size:
-        rows = order[i : i + LANES]
-        rows = rows[: leading_compatible(p, rows)]
-        together = len(own) == 0 and slopes.shape[2] == 0 and can_share_lanes(masses, p, rows)
-        if not together:
-            rows = rows[:1]
-        i += rows.size
-        common = 0 if all_differ else alike[rows[0]]
+    samples, the_first = torque.shape[1], np.zeros(1, dtype=np.int64)
+    given: Any = (torque, load, fed_by, loaded_by, angle, followed, p, state, outputs, sensor, out, slopes)
+
+    def one_by_one(rows: IntArray, first: int, last: int) -> None:
+        steps = (sample_time_s, substeps, sign_width, first, last, start_s)
+        integrate(masses, own, *steps, rows, *given)
+
+    all_differ = not alike[1:].any()
+    order, reached = compatible_together(p) if all_differ else 1 + np.argsort(alike[1:]), 0
+    while order.size:
+        rows = order[: leading_compatible(p, order[:LANES])]
+        together = not own and slopes.shape[2] == 0 and can_share_lanes(masses, p, rows)
+        rows = rows if together or all_differ else rows[:1]
+        order = order[rows.size :]
+        common = 0 if all_differ else int(alike[rows[0]])
         if common > reached:
-            known = (torque[fed_by[0]], load[loaded_by[0]], angle, followed, p[0], state[0])
-            integrate(masses, own, *given, reached, common, start_s, *known, outputs, sensor, out[0], slopes[0])
+            one_by_one(the_first, reached, common)
             reached = common
         if reached > 0:
-            for row in rows:
-                state[row] = state[0]
-                out[row, :, :reached] = out[0, :, :reached]
-                slopes[row, :, : reached + 1] = slopes[0, :, : reached + 1]
+            state[rows] = state[0]
+            out[rows, :, :reached] = out[0, :, :reached]
+            slopes[rows, :, : reached + 1] = slopes[0, :, : reached + 1]
         if together:
-            finest = substeps
-            for row in rows:
-                finest = max(finest, with_mode(substeps, sample_time_s, p[row]))
-            them = (torque, load, fed_by, loaded_by, angle, followed, p, state)
-            integrate_side_by_side(
-                masses, sample_time_s, finest, sign_width, reached, start_s, rows, *them, outputs, sensor, out
-            )
+            integrate_side_by_side(masses, sample_time_s, substeps, sign_width, reached, start_s, rows, *given[:-1])
         else:
-            row = rows[0]
-            it = (torque[fed_by[row]], load[loaded_by[row]], angle, followed, p[row], state[row])
-            integrate(masses, own, *given, reached, samples, start_s, *it, outputs, sensor, out[row], slopes[row])
+            one_by_one(rows, reached, samples)
     if not all_differ:
-        rest = (torque[fed_by[0]], load[loaded_by[0]], angle, followed, p[0], state[0])
-        integrate(masses, own, *given, reached, samples, start_s, *rest, outputs, sensor, out[0], slopes[0])
+        one_by_one(the_first, reached, samples)

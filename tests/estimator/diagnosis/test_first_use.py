@@ -37,8 +37,8 @@ for kernel in signatures(2):
 FOUND_KEPT = """
 from pathlib import Path
 from estimator.diagnosis.first_use import is_first_use
-from estimator.physics.kernel.side_by_side import integrate_each
-here = Path(integrate_each.stats.cache_path)
+from estimator.physics.kernel.side_by_side import integrate_side_by_side
+here = Path(integrate_side_by_side.stats.cache_path)
 for place in (here.with_name("kernel_of_another_installation"), here):
     print(is_first_use(2))
     place.mkdir(parents=True, exist_ok=True)
