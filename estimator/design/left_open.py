@@ -68,7 +68,7 @@ def _open(found: SearchResult, untested: tuple[str, ...], diagnosis: Diagnosis) 
         and not (each.effects in judged.tried and judged.believed.beats(judged.tried[each.effects]))
     }
     as_good = _as_good(search.fits, judged)
-    near |= {each.effects: each for each in (*_larger(search.fits, judged), *as_good, best)}
+    near |= {each.effects: each for each in (*with_one_more(search.fits, judged), *as_good, best)}
     lowest = min(each.score for each in near.values())
     behind = {effects: each.score - lowest for effects, each in near.items()} | dict.fromkeys(
         (best.effects, *(each.effects for each in as_good)), 0.0
@@ -135,7 +135,7 @@ def _as_good(fits: Fits, judged: Judged) -> list[Hypothesis]:
     return [fits.ended[each] for each in exchanged if each in fits.ended and not _holds(each, effects)]
 
 
-def _larger(fits: Fits, judged: Judged) -> list[Hypothesis]:
+def with_one_more(fits: Fits, judged: Judged) -> list[Hypothesis]:
     """Return the verdict's set with one effect more, where that may well be there: no name yet, and no trace either.
 
     The likelihood asks for it, and more than half of what the verdict leaves beyond the noise is gone with it, be that

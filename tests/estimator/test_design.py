@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.design.left_open import _larger as larger, left_open
+from estimator.design.left_open import left_open, with_one_more
 from estimator.design.open import Candidate, Open, Untested, name_of, precision_of as precision
 from estimator.design.paper import (
     LEAST_DIFFERENCE,
@@ -217,8 +217,8 @@ def test_a_likely_effect_that_the_verdict_does_not_name_is_another_explanation()
     fits = Fits(bench.model, bench.records, bench.use, [NAMES[0], "transport_delay"])
     friction = search_from_nothing(fits).best
     nothing, named = fits.trials.of([fits.nothing(), friction])
-    assert [each.effects for each in larger(fits, Judged(nothing, named, nothing))] == [friction.effects]
-    assert larger(fits, Judged(nothing, named, named)) == []
+    assert [each.effects for each in with_one_more(fits, Judged(nothing, named, nothing))] == [friction.effects]
+    assert with_one_more(fits, Judged(nothing, named, named)) == []
 
 
 def test_what_the_verdict_says_could_as_well_be_there_is_not_decided() -> None:

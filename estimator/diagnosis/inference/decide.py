@@ -161,7 +161,7 @@ def _judged(search: Search, rival: Rival) -> Judged:
     likely, tried = _candidates(search)
     noise = noise_of(likely.hypothesis)
     chosen = nothing
-    while (larger := _needed_beyond(chosen, tried, noise)) is not None:
+    while (larger := needed_beyond(chosen, tried, noise)) is not None:
         chosen = larger
     sheet = next((each for each in sheets if _is_rather(each, fits.model, chosen, noise)), None)
     if sheet is not None:
@@ -206,7 +206,7 @@ def _candidates(search: Search) -> tuple[Trial, list[Trial]]:
     return next(trial for trial in tried if trial.effects == found.effects), tried
 
 
-def _needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial | None:
+def needed_beyond(chosen: Trial, tried: Sequence[Trial], noise: float) -> Trial | None:
     """Return the smallest set that the simulation needs in the place of another one; None where it needs none.
 
     It leaves at most the `LEAST_NECESSITY`-th part of the error beyond the noise that the other one leaves, and no set

@@ -226,7 +226,7 @@ def discrepancy(
         equivalents=_equivalents(retuned, inputs, likeliest.log_likelihood, motion),
         spectrum=spectrum,
         responses=by_recording,
-        pictures=_pictures_of_effects(effects_added(retuned, final), final, motions, floor, motion),
+        pictures=pictures_of_effects(effects_added(retuned, final), final, motions, floor, motion),
     )
 
 
@@ -262,9 +262,10 @@ def _courses(records: Sequence[Record], explanation: Explanation) -> Mapping[str
     }
 
 
-def _pictures_of_effects(
+def pictures_of_effects(
     named: Sequence[str], final: FitResult, motions: Sequence[Motion], floor: float, motion: model.Motion
 ) -> tuple[LawPicture, ...]:
+    """Return the laws of some effects as the recordings show them, with the rest of the fit taken out."""
     drawn = [
         picture(name, EFFECTS[name].element, without_effect(final, name), final.outputs, motions, floor, motion)
         for name in named

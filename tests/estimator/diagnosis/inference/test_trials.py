@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from estimator.diagnosis.inference.decide import _needed_beyond as needed_beyond
+from estimator.diagnosis.inference.decide import needed_beyond
 from estimator.diagnosis.inference.hypotheses import GRADE, Hypothesis
 from estimator.diagnosis.inference.trials import Trial, blocks, necessity, quantile, size_of
 from estimator.diagnosis.thresholds import Judging

@@ -9,7 +9,7 @@ import pytest
 
 from estimator.diagnosis.inference.hypotheses import NOTHING, all_good_samples
 from estimator.diagnosis.line.line import motion_of
-from estimator.diagnosis.where.discrepancy import _pictures_of_effects, discrepancy, effects_added, without_effect
+from estimator.diagnosis.where.discrepancy import discrepancy, effects_added, pictures_of_effects, without_effect
 from estimator.diagnosis.where.locate import error_spectrum, responses
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Element
@@ -61,7 +61,7 @@ def test_a_gap_is_drawn_as_the_torque_of_the_shaft_over_its_twist_with_its_dead_
     with_gap = replace(drive, output=simulate(grid_for(line, [drive]), drive, p, START) + noise)
     final = fit(make_problem(line, [with_gap], effect_unknowns("backlash", line, [with_gap])[1].shared))
     motions = [motion_of(final, 0, is_between=True)]
-    (picture,) = _pictures_of_effects(("backlash",), final, motions, SIGMA, Motion.ROTATION)
+    (picture,) = pictures_of_effects(("backlash",), final, motions, SIGMA, Motion.ROTATION)
     assert (picture.signal, picture.signal_unit, picture.unit) == ("twist of the shaft", "rad", "Nm")
     beyond = np.abs(picture.x) - 0.5 * gap_rad
     outside = beyond > 0.3 * gap_rad
