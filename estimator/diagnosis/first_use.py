@@ -21,7 +21,6 @@ from numba.core.types import boolean, float64, int64
 
 from estimator.compiled import IS_COMPILED, ROOT
 from estimator.diagnosis.inference.hypotheses import Progress
-from estimator.diagnosis.line.equivalent import Filtered, run_filter, run_smoother
 from estimator.least_squares import least
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.kernel.integration import integrate
@@ -31,17 +30,15 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES, simulate
 from estimator.signals.record import Record
 
-COMPILING = "compiling, once on this machine, for some minutes"
+COMPILING = "compiling, once on this machine, for about a minute"
 
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
-_fields: Any = types.NamedTuple
 _TUPLE: Any = types.UniTuple
 _JOINED: Any = types.Tuple
 _NOTHING: Any = _JOINED(())
 _EACH = (_ROWS, _ROWS, _INDICES, _INDICES, _ROW, _ROW, _ROWS, _ROWS, _INDICES, boolean, _STACK)
-_FILTERED = _fields((_ROWS, _STACK, _ROWS, _ROW, _ROW), Filtered)
 
-SIDE_BY_SIDE: tuple[tuple[Any, ...], ...] = ((integrate,), (integrate_side_by_side, least, run_filter, run_smoother))
+SIDE_BY_SIDE: tuple[tuple[Any, ...], ...] = ((integrate,), (integrate_side_by_side, least))
 """What one process compiles while the other does."""
 
 
@@ -67,8 +64,6 @@ def signatures(masses: int) -> dict[Any, tuple[Any, ...]]:
         integrate: (inertias, own, *steps, int64, int64, float64, _INDICES, *_EACH, _STACK),
         integrate_side_by_side: (inertias, *steps, int64, float64, _INDICES, *_EACH),
         least: (_ROWS, _ROW, _ROW, _ROW, int64, int64),
-        run_filter: (_ROWS, _ROW, float64, float64, _ROWS, _ROW, boolean[::1], _FILTERED),
-        run_smoother: (_ROWS, _ROW, _FILTERED, _ROW, _ROW),
     }
 
 

@@ -14,9 +14,10 @@ from estimator.diagnosis.line.whitening import (
     Gains,
     StateSpace,
     Terms,
+    beginnings,
     fill_gains,
     innovate,
-    innovate_each,
+    innovations_of,
     terms_of,
 )
 from estimator.diagnosis.noise import noise_floor
@@ -33,6 +34,8 @@ from estimator.signals.record import BoolArray, FloatArray, OutputKind, Record, 
 READING = 3  # how many sizes are of an output's reading
 
 STEP = 1e-4  # change of a logarithm by which derivatives are found
+
+DAMPINGS = 5.0 ** np.arange(LANES)  # by what the damping of a scoring step is multiplied, of steps tried at once
 
 
 class Size(IntEnum):
@@ -77,8 +80,9 @@ class Whitener:
 
     def part(self, index: int, columns: FloatArray) -> FloatArray:
         """Return the same of one recording alone, shape (R_i, K)."""
-        found = np.array(columns, order="C")
-        innovate(self.f, self.h, self.gains[index], self.use[index], found)
+        found, use, gains = np.array(columns, order="C"), self.use[index], self.gains[index]
+        room = tuple(np.zeros((each, found.shape[1])) for each in (*2 * gains.predictor.shape[2:], use.shape[1]))
+        innovate(self.f, self.h, gains, use, found, beginnings(use), room)
         return found
 
     @property
@@ -104,9 +108,9 @@ class Innovations(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Whitening:
-    """What the filters of some recordings depend on, beside the noise model."""
+    """What the filters of some recordings depend on besides the noise model."""
 
-    line: LinearLine
+    line: LinearLine  # how torque and load spread
     period_s: float  # between samples [s]
     use: Sequence[BoolArray]  # (N_i, C): which outputs were read
     unread: Sequence[FloatArray]  # (N_i,): variance of the torque where it was not read
@@ -129,7 +133,8 @@ class Whitening:
             if key not in seen:
                 count, m = mask.shape[1], model.at_input.shape[1]
                 seen[key] = Gains(np.empty((*mask.shape, m)), np.empty((*mask.shape, count)), np.empty(mask.shape))
-                fill_gains(model, mask, unread, seen[key])
+                room = (np.empty(m * m), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
+                fill_gains(model, mask, unread, seen[key], model.prior.copy(), room)
             each.append(seen[key])
         return Whitener(model.f, model.h, tuple(each), tuple(self.use), tuple(self.rows))
 
@@ -140,13 +145,8 @@ class Whitening:
             some = slice(first, first + LANES)
             count = sizes[some].shape[0]
             model = self._model(np.resize(sizes[some], (LANES, sizes.shape[1])))
-            m = model.at_input.shape[1]
             for i, (mask, rows) in enumerate(zip(self.use, self.rows, strict=True)):
-                mine = error[rows]
-                values, variances = np.empty((mine.size, LANES)), np.empty((mine.size, LANES))
-                places = np.concatenate([[0], np.cumsum(mask.sum(axis=0))[:-1]])
-                room = np.zeros((m * m, LANES)), np.zeros((m, LANES)), np.zeros((m, LANES))
-                innovate_each(model, mask, self._unread(i), mine, places, model.prior.copy(), room, values, variances)
+                values, variances = innovations_of(model, mask, self._unread(i), error[rows])
                 found.values[some, rows] = (values / np.sqrt(variances)).T[:count]
                 found.logs[some, rows] = 0.5 * np.log(variances).T[:count]
         return found
@@ -298,10 +298,6 @@ def estimated(
     limits = limits if whitening.changes else limits.without_forms()
     initial = starts(sizes, limits) if is_anew else [sizes]
     return min((estimate(whitening, error, each, limits, rounds) for each in initial), key=lambda each: each[1])
-
-
-DAMPINGS = 5.0 ** np.arange(LANES)
-"""By what the damping of a scoring step is multiplied, of steps that are tried at once."""
 
 
 def estimate(

@@ -14,10 +14,19 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from estimator.compiled import compiled
 from estimator.diagnosis.line.line import LinearLine, line_of
+from estimator.diagnosis.line.whitening import (
+    StateSpace,
+    correct,
+    innovations_of,
+    predict,
+    shown,
+    surprise,
+    terms_of,
+)
+from estimator.lanes import LANES
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult
 from estimator.physics.layout import slot
@@ -35,7 +44,7 @@ INITIAL_SPREAD = 10.0
 FORGETS_S = 1.0
 """A shaft torque that stays is invisible: it only holds another twist. Its walk returns to zero in about this time."""
 
-SEARCH_TOLERANCE = 0.15  # of the rate's decimal logarithm: the likelihood is flat around its top
+ZOOMS = 3  # rounds of rates around the best so far, side by side: to 6 %, where the likelihood is flat
 
 DRIVES = {Element.TORQUE_PATH: 1.0, Element.MOTOR: -1.0, Element.SHAFT: 1.0, Element.LOAD: 1.0}
 """Sign of a law at its place: the torque path drives the motor, friction at the motor brakes it."""
@@ -64,144 +73,53 @@ def size_at(result: FitResult, place: Element) -> float:
 
 
 class Filtered(NamedTuple):
-    """What the smoother needs of the filter: predictions, gains, surprises and their precision (0: not observed)."""
+    """What the smoother needs of the filter: predictions of state and input, gains, innovations and their precision."""
 
-    means: FloatArray  # (N, n + 1): predicted state and input
-    covariances: FloatArray  # (N, n + 1, n + 1) of these
-    gains: FloatArray  # (N, n + 1): correction per unit of surprise
-    surprises: FloatArray  # (N,): error less its prediction
-    precisions: FloatArray  # (N,): one over their variance
-
-
-@compiled
-def row_times_column(a: FloatArray, row: int, b: FloatArray, column: int) -> float:
-    """Return one entry of ``a b``."""
-    total = 0.0
-    for k in range(a.shape[1]):
-        total += a[row, k] * b[k, column]
-    return total
+    means: FloatArray  # (N, m): state and input, as predicted
+    own: FloatArray  # (N, m): covariances of the input, which stands last, with these
+    gains: FloatArray  # (N, m): correction per unit of innovation
+    innovations: FloatArray  # (N,): error less its prediction
+    precisions: FloatArray  # (N,): one over their variance; 0: not observed
 
 
 @compiled
-def product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Fill ``out`` with ``a b``; small matrices."""
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = row_times_column(a, i, b, j)
+def run_filter(model: StateSpace, error: FloatArray, seen: BoolArray, p: FloatArray, kept: Filtered) -> None:
+    """Filter an error, shape (N,), where it was seen; keep what the smoother needs.
 
-
-@compiled
-def symmetric_product(a: FloatArray, b: FloatArray, out: FloatArray) -> None:
-    """Fill ``out`` with ``a b`` where that is symmetric, and keep it so to the last bit."""
-    for i in range(out.shape[0]):
-        for j in range(i + 1):
-            out[i, j] = row_times_column(a, i, b, j)
-            out[j, i] = out[i, j]
-
-
-@compiled
-def observe(
-    error: float, noise: float, h: FloatArray, mean: FloatArray, covariance: FloatArray, gain: FloatArray
-) -> tuple[float, float]:
-    """Correct the prediction by one observation; return the surprise and its precision, and fill the gain."""
-    m = h.shape[0]
-    surprise, spread = error, noise
-    for r in range(m):
-        total = 0.0
-        for j in range(m):
-            total += covariance[r, j] * h[j]
-        gain[r] = total
-        surprise -= h[r] * mean[r]
-        spread += h[r] * total
-    for r in range(m):
-        mean[r] += gain[r] * surprise / spread
-        for j in range(m):
-            covariance[r, j] -= gain[r] * gain[j] / spread
-    for r in range(m):
-        gain[r] /= spread
-    return surprise, 1.0 / spread
-
-
-@compiled
-def run_filter(
-    f: FloatArray,
-    h: FloatArray,
-    walk: float,
-    noise: float,
-    prior: FloatArray,
-    error: FloatArray,
-    seen: BoolArray,
-    kept: Filtered,
-) -> float:
-    """Return the log-likelihood of an error; keep what the smoother needs where ``kept`` has room.
-
-    State and input move on by ``f``, (m, m), show by ``h``, (m,), and begin within ``prior``, (m, m); ``walk`` is the
-    variance of the input's change from sample to sample, ``noise`` that of the reading.
+    ``p``, shape (m m,), is the covariance of the first state and input, which is written over.
     """
-    m = h.shape[0]
-    keep = kept.surprises.shape[0] > 0
-    half, mean, moved, gain = np.zeros((m, m)), np.zeros(m), np.zeros(m), np.zeros(m)
-    covariance = prior.copy()
-    likelihood = 0.0
+    m = kept.means.shape[1]
+    x, moved, ph, half = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m * m)
     for t in range(error.shape[0]):
-        if keep:
-            kept.means[t] = mean
-            kept.covariances[t] = covariance
+        kept.means[t], kept.own[t] = x, p[m * (m - 1) :]
         if seen[t]:
-            surprise, precision = observe(error[t], noise, h, mean, covariance, gain)
-            likelihood -= 0.5 * (np.log(2.0 * np.pi / precision) + surprise * surprise * precision)
-            if keep:
-                kept.surprises[t] = surprise
-                kept.precisions[t] = precision
-                kept.gains[t] = gain
-        for r in range(m):
-            moved[r] = 0.0
-            for j in range(m):
-                moved[r] += f[r, j] * mean[j]
-        mean[:] = moved
-        product(f, covariance, half)
-        symmetric_product(half, f.T, covariance)
-        covariance[m - 1, m - 1] += walk
-    return likelihood
-
-
-@compiled
-def fill_step(f: FloatArray, gain: FloatArray, h: FloatArray, step: FloatArray) -> None:
-    """Fill how the filter's error moves on: ``f (1 - gain h')``."""
-    m = h.shape[0]
-    for r in range(m):
-        pull = 0.0
-        for j in range(m):
-            pull += f[r, j] * gain[j]
-        for j in range(m):
-            step[r, j] = f[r, j] - pull * h[j]
+            s = surprise(model.h, 0, model.r, p, ph, m)
+            e = error[t] - shown(model.h, 0, x)
+            correct(p, ph, s, m)
+            kept.gains[t], kept.innovations[t], kept.precisions[t] = ph / s, e, 1.0 / s
+            x += kept.gains[t] * e
+        moved[:] = 0.0
+        for n in range(model.f.rows.size):
+            moved[model.f.rows[n]] += model.f.values[n] * x[model.f.columns[n]]
+        x[:] = moved
+        predict(model.f, model.q, p, half, m)
 
 
 @compiled
 def run_smoother(f: FloatArray, h: FloatArray, kept: Filtered, value: FloatArray, variance: FloatArray) -> None:
-    """Go back over what the filter kept: fill the input's estimate and its variance, each of shape (N,)."""
+    """Go back over what the filter kept: fill the input's estimate and its variance, each of shape (N,).
+
+    ``f``, (m, m), and ``h``, (m,), are how state and input move on and how they show.
+    """
     m = h.shape[0]
-    step, half = np.zeros((m, m)), np.zeros((m, m))
-    score, back, information = np.zeros(m), np.zeros(m), np.zeros((m, m))
-    for t in range(kept.surprises.shape[0] - 1, -1, -1):
+    score, information = np.zeros(m), np.zeros((m, m))
+    for t in range(kept.innovations.shape[0] - 1, -1, -1):
         precision = kept.precisions[t]
-        fill_step(f, kept.gains[t], h, step)
-        for r in range(m):
-            back[r] = h[r] * kept.surprises[t] * precision
-            for j in range(m):
-                back[r] += step[j, r] * score[j]
-        score[:] = back
-        product(information, step, half)
-        product(step.T, half, information)
-        own = kept.covariances[t, m - 1]
-        value[t], variance[t] = kept.means[t, m - 1], own[m - 1]
-        for r in range(m):
-            value[t] += own[r] * score[r]
-            for j in range(m):
-                information[r, j] += h[r] * h[j] * precision
-        for r in range(m):
-            for j in range(m):
-                variance[t] -= own[r] * information[r, j] * own[j]
+        step = f - np.outer(f @ kept.gains[t], h)  # how the filter's error moves on
+        score = step.T @ score + h * (kept.innovations[t] * precision)
+        information = step.T @ (information @ step) + np.outer(h, h) * precision
+        value[t] = kept.means[t, m - 1] + kept.own[t] @ score
+        variance[t] = kept.own[t, m - 1] - kept.own[t] @ (information @ kept.own[t])
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,20 +144,15 @@ def explain(result: FitResult, place: Element, floor: float) -> Explanation:
     """Estimate the input at one place that explains a fit's error, each recording's in turn."""
     problem, size = result.problem, size_at(result, place)
     errors = [record.output - output for record, output in zip(problem.records, result.outputs, strict=True)]
-
-    def deficit(exponent: float) -> float:
-        chain = _chain(result, place, size * 10.0**exponent, floor)
-        nothing = _room(0, chain.h.size)
-        return -sum(run_filter(*chain, error, use, nothing) for error, use in zip(errors, problem.use, strict=True))
-
-    best = minimize_scalar(
-        deficit,
-        bounds=(np.log10(SLOWEST), np.log10(FASTEST)),
-        method="bounded",
-        options={"xatol": SEARCH_TOLERANCE},
-    )
-    rate = size * 10.0 ** float(best.x)
-    return Explanation(place, smoothed(result, errors, problem.use, place, rate, floor), rate, -float(best.fun))
+    low, high, best, highest = SLOWEST, FASTEST, SLOWEST, -np.inf
+    for _ in range(ZOOMS):
+        rates = np.geomspace(low, high, LANES)
+        found = _log_likelihoods(_models(result, place, size * rates, floor), errors, problem.use)
+        top = int(np.argmax(found))
+        if found[top] > highest:
+            best, highest = float(rates[top]), float(found[top])
+        low, high = rates[max(top - 1, 0)], rates[min(top + 1, LANES - 1)]
+    return Explanation(place, smoothed(result, errors, problem.use, place, size * best, floor), size * best, highest)
 
 
 def explain_all(result: FitResult, floor: float) -> dict[Element, Explanation]:
@@ -257,36 +170,51 @@ def smoothed(
     floor: float,
 ) -> tuple[Input, ...]:
     """Estimate the input at one place that explains errors of each recording where they are seen, its rate given."""
-    chain, found = _chain(result, place, rate, floor), []
+    model, found = _models(result, place, np.array([rate]), floor).at(0), []
+    m = model.at_input.shape[1]
+    (f, h), line = np.zeros((2, m, m)), model.f
+    f[line.rows, line.columns], h[model.h.rows, model.h.columns] = line.values, model.h.values
     for error, seen in zip(errors, use, strict=True):
-        kept, value, variance = _room(error.size, chain.h.size), np.zeros(error.size), np.zeros(error.size)
-        run_filter(*chain, error, seen, kept)
-        run_smoother(chain.f, chain.h, kept, value, variance)
+        value, variance = np.zeros((2, error.size))
+        kept = Filtered(*np.zeros((3, error.size, m)), *np.zeros((2, error.size)))
+        run_filter(model, error, seen, model.prior.copy(), kept)
+        run_smoother(f, h[0], kept, value, variance)
         found.append(Input(value, np.sqrt(np.maximum(variance, 0.0))))
     return tuple(found)
 
 
-class Chain(NamedTuple):
-    """The line of n states as an input sees it, as `run_filter` takes it; its last state is the input."""
+def _log_likelihoods(models: StateSpace, errors: Sequence[FloatArray], use: Sequence[BoolArray]) -> FloatArray:
+    """Return the log-likelihood of errors of recordings where they are seen, under each of `LANES` models."""
+    total = np.zeros(LANES)
+    for error, seen in zip(errors, use, strict=True):
+        values, variances = innovations_of(models, seen[:, np.newaxis], np.zeros((seen.size, 0)), error[seen])
+        total -= 0.5 * np.sum(np.log(2.0 * np.pi * variances) + values**2 / variances, axis=0)
+    return total
 
-    f: FloatArray  # (n + 1, n + 1): how they move on
-    h: FloatArray  # (n + 1,): how they show in the output
-    walk: float  # variance of the input's change from sample to sample
-    noise: float  # of the reading, its variance
-    prior: FloatArray  # (n + 1, n + 1): covariance of their first values
 
-
-def _chain(result: FitResult, place: Element, rate: float, floor: float) -> Chain:
+def _models(result: FitResult, place: Element, rates: FloatArray, floor: float) -> StateSpace:
+    """Return the line and an input at a place, its last state, whose walk has each of some rates, shape (L,)."""
     line, period_s, size = line_of(result), result.problem.records[0].sample_time_s, size_at(result, place)
-    n, is_sensor = line.torque.size, place is Element.SPEED_SENSOR
-    f, h, prior = np.zeros((n + 1, n + 1)), np.zeros(n + 1), np.zeros((n + 1, n + 1))
+    n, is_sensor, count = line.torque.size, place is Element.SPEED_SENSOR, rates.size
+    f, h, prior = np.zeros((n + 1, n + 1)), np.zeros((1, n + 1)), np.zeros((n + 1, n + 1))
     f[:n, :n], f[n, n] = line.f, np.exp(-period_s / FORGETS_S) if place is Element.SHAFT else 1.0
-    h[:n], h[n] = line.h[0], 1.0 if is_sensor else line.direct
+    h[0, :n], h[0, n] = line.h[0], 1.0 if is_sensor else line.direct
     if not is_sensor:  # with an error of the reading the line itself is as simulated
         f[:n, n] = {Element.MOTOR: line.torque, Element.LOAD: line.load, Element.SHAFT: line.shaft}[place]
         prior[np.arange(n), np.arange(n)] = (INITIAL_SPREAD * _scales(result, line)) ** 2
     prior[n, n] = size**2
-    return Chain(f, h, rate**2 * period_s, floor**2, prior)
+    q = np.zeros(((n + 1) ** 2, count))
+    q[-1] = rates**2 * period_s
+    each = np.ones(count)
+    return StateSpace(
+        terms_of(f[..., np.newaxis] * each),
+        terms_of(h),
+        q,
+        np.full((1, count), floor**2),
+        prior.reshape(-1, 1) * each,
+        np.zeros((0, n + 1)),
+        np.zeros((0, count)),
+    )
 
 
 def _scales(result: FitResult, line: LinearLine) -> FloatArray:
@@ -297,7 +225,3 @@ def _scales(result: FitResult, line: LinearLine) -> FloatArray:
     if scales.size % 2 == 0:
         scales[-1:] = 1.0
     return scales
-
-
-def _room(rows: int, m: int) -> Filtered:
-    return Filtered(np.zeros((rows, m)), np.zeros((rows, m, m)), np.zeros((rows, m)), np.zeros(rows), np.zeros(rows))

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.compiled import compiled, inlined
-from estimator.lanes import as_lanes, borrowed, broadcast_as
+from estimator.lanes import LANES, as_lanes, borrowed, broadcast_as
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 SETTLED = 1e-5
@@ -88,7 +88,7 @@ def shown(h: Terms, i: int, x: FloatArray) -> float:
 
 @inlined
 def correct(p: FloatArray, ph: FloatArray, s: float, m: int) -> None:
-    """Correct a covariance by an output of which ``surprise`` told."""
+    """Correct a covariance by an output, as ``surprise`` found it."""
     for row in range(m):
         gain = ph[row] / s
         for k in range(row + 1):
@@ -148,27 +148,20 @@ def is_as_before(observed: BoolArray, t: int) -> bool:
 
 
 @compiled
-def fill_gains(model: StateSpace, observed: BoolArray, unread: FloatArray, gains: Gains) -> None:
-    """Fill the gains of a recording's filter under one noise model.
-
-    ``observed``, shape (N, C), tells which outputs were read, ``unread``, shape (N, n), the variance of each input
-    before its share.
-    """
-    count, m = model.r.size, model.at_input.shape[1]
-    room = (np.empty(m * m), np.empty((count, m)), np.empty((count, m)), np.zeros(m), np.empty(count))
-    fill_gains_in(model, model.prior.copy(), observed, unread, gains, room)
-
-
-@compiled
-def fill_gains_in(
+def fill_gains(
     model: StateSpace,
-    p: FloatArray,
     observed: BoolArray,
     unread: FloatArray,
     gains: Gains,
+    p: FloatArray,
     room: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> None:
-    """Do what ``fill_gains`` does, from the covariance of the first state and with room for what it needs."""
+    """Fill the gains of a recording's filter under one noise model.
+
+    ``observed``, shape (N, C), says which outputs were read, ``unread``, shape (N, n), the variance of each input
+    before its share. ``p`` is the covariance of the first state, which is written over; ``room`` is for a covariance,
+    two (C, m), and (m,) and (C,).
+    """
     f = Terms(borrowed(model.f.rows), borrowed(model.f.columns), borrowed(model.f.values))
     h = Terms(borrowed(model.h.rows), borrowed(model.h.columns), borrowed(model.h.values))
     q, r, at_input, share = borrowed(model.q), borrowed(model.r), borrowed(model.at_input), borrowed(model.share)
@@ -216,7 +209,7 @@ def innovate_each(
 ) -> None:
     """Fill the innovations of one error, shape (R,), and their variances under noise models in lanes, (R, LANES).
 
-    ``places``, shape (C,), tells where each output's samples begin, ``p`` the covariance of the first state, which is
+    ``places``, shape (C,), is where each output's samples begin, ``p`` the covariance of the first state, which is
     written over, and ``room`` is for a covariance and two states, each (..., LANES).
     """
     h = Terms(borrowed(model.h.rows), borrowed(model.h.columns), borrowed(model.h.values))
@@ -247,6 +240,27 @@ def innovate_each(
         add_inputs(at_input, share, unread[t], covariance, m)
 
 
+def innovations_of(
+    models: StateSpace, observed: BoolArray, unread: FloatArray, error: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the innovations of one error and their variances under `LANES` noise models, each (R, LANES).
+
+    ``observed``, (N, C), says which outputs were read, ``unread``, (N, n), the variance of each input before its share;
+    ``error``, (R,), has the samples that were observed, of one output after the other.
+    """
+    m, (values, variances) = models.at_input.shape[1], np.empty((2, error.size, LANES))
+    room = np.zeros((m * m, LANES)), np.zeros((m, LANES)), np.zeros((m, LANES))
+    innovate_each(models, observed, unread, error, beginnings(observed), models.prior.copy(), room, values, variances)
+    return values, variances
+
+
+def beginnings(observed: BoolArray) -> IntArray:
+    """Return where the samples of each output begin, shape (C,), in a stack of those that were observed, (N, C)."""
+    counts = observed.sum(axis=0)
+    found: IntArray = np.cumsum(counts) - counts
+    return found
+
+
 @inlined
 def add_products(terms: Terms, sign: float, x: FloatArray, total: FloatArray) -> None:
     """Add a matrix times ``x``, shape (n, K), with a sign to a total, shape (m, K)."""
@@ -270,27 +284,20 @@ def fill_gained(gains: FloatArray, t: int, e: FloatArray, total: FloatArray) -> 
 
 
 @compiled
-def innovate(f: Terms, h: Terms, gains: Gains, observed: BoolArray, signals: FloatArray) -> None:
-    """Replace signals of the samples that were observed by their innovations over the standard deviations."""
-    outputs, m, count = observed.shape[1], gains.predictor.shape[2], signals.shape[1]
-    places = np.zeros(outputs, dtype=np.int64)
-    for i in range(1, outputs):
-        places[i] = places[i - 1] + observed[:, i - 1].sum()
-    room = (np.zeros((m, count)), np.zeros((m, count)), np.zeros((outputs, count)))
-    innovate_in(f, h, gains, observed, signals, places, room)
-
-
-@compiled
-def innovate_in(
+def innovate(
     f: Terms,
     h: Terms,
     gains: Gains,
     observed: BoolArray,
     signals: FloatArray,
     places: IntArray,
-    room: tuple[FloatArray, FloatArray, FloatArray],
+    room: tuple[FloatArray, ...],
 ) -> None:
-    """Do what ``innovate`` does, from where each output begins, with room for two states and the innovations."""
+    """Replace signals of the samples that were observed, (R, K), by their innovations over the standard deviations.
+
+    ``places``, shape (C,), is where each output's samples begin; ``room`` is for two states and the innovations, each
+    of K columns.
+    """
     f = Terms(borrowed(f.rows), borrowed(f.columns), borrowed(f.values))
     h = Terms(borrowed(h.rows), borrowed(h.columns), borrowed(h.values))
     predictor, cross, spread = borrowed(gains.predictor), borrowed(gains.cross), borrowed(gains.spread)

@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import block_diag
 
 from estimator.diagnosis.line.equivalent import Filtered, explain, run_filter, run_smoother
+from estimator.diagnosis.line.whitening import StateSpace, terms_of
 from estimator.physics.effect import Element
 from estimator.physics.fit import FitResult, fit
 from estimator.physics.problem import make_problem
@@ -45,12 +46,15 @@ def test_filter_and_smoother_are_the_conditional_normal_distribution() -> None:
         + seen.size * np.log(2.0 * np.pi)
     )
 
-    shown = np.array([*c, direct])
-    kept = Filtered(
-        np.zeros((samples, 3)), np.zeros((samples, 3, 3)), np.zeros((samples, 3)), np.zeros(samples), np.zeros(samples)
+    shown, drives = np.array([*c, direct]), np.diag([0.0, 0.0, walk])
+    model = StateSpace(
+        terms_of(f), terms_of(shown[None]), drives.ravel(), np.array([noise]), prior.ravel(), np.eye(0, 3), np.zeros(0)
     )
-    value, spreads = np.zeros(samples), np.zeros(samples)
-    assert run_filter(f, shown, walk, noise, prior, error, okay, kept) == pytest.approx(likelihood)
+    kept = Filtered(*np.zeros((3, samples, 3)), *np.zeros((2, samples)))
+    value, spreads = np.zeros((2, samples))
+    run_filter(model, error, okay, model.prior.copy(), kept)
+    squares = kept.innovations[okay] ** 2 * kept.precisions[okay]
+    assert -0.5 * np.sum(np.log(2.0 * np.pi / kept.precisions[okay]) + squares) == pytest.approx(likelihood)
     run_smoother(f, shown, kept, value, spreads)
     np.testing.assert_allclose(value, mean[:, 2], atol=1e-9)
     np.testing.assert_allclose(spreads, variance[:, 2], atol=1e-9)
