@@ -336,11 +336,14 @@ def estimate(
             each[free] -= np.clip(np.linalg.solve(damped, gradient[free]), -2.0, 2.0)
         tried = np.clip(tried, limits.low, limits.high)
         values, there, their_logs = at(tried)
-        best = int(np.argmin(values))
-        gained = value - values[best]
-        if gained > 0.0:
-            damping *= 0.2 * DAMPINGS[best]
-            sizes, value, innovations, logs = tried[best], values[best], there[best], their_logs[best]
-        if not gained >= Fitting.ENOUGH:
+        gained = value - values
+        if not (gained > 0.0).any():
+            break
+        least = int(
+            np.argmax(gained > 0.0)
+        )  # of the steps that gain the least damped, and not the one that gains most:
+        damping *= 0.2 * DAMPINGS[least]  # that one takes what a law has yet to explain for noise
+        sizes, value, innovations, logs = tried[least], values[least], there[least], their_logs[least]
+        if gained[least] < Fitting.ENOUGH:
             break
     return sizes, float(value)
