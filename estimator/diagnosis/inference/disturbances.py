@@ -305,8 +305,8 @@ def estimate(
 ) -> tuple[FloatArray, float]:
     """Return the most probable noise model of an error and its minus twice log-posterior, by Fisher scoring.
 
-    The derivatives by all sizes, and steps of all dampings, take a filter each; these run side by side. Of the steps that
-    gain the least damped is taken: the one that gains most takes what a law has yet to explain for noise.
+    The derivatives by all sizes, and steps of all dampings, take a filter each; these run side by side. Of the steps
+    that gain the least damped is taken: the one that gains most takes what a law has yet to explain for noise.
     """
 
     def at(sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
