@@ -155,5 +155,5 @@ def test_noise_models_side_by_side_are_each_as_alone(result: FitResult, count: i
     found = whitening.innovations(error, sizes)
     for values, logs, each in zip(found.values, found.logs, sizes, strict=True):
         alone = whitening.filters(each)
-        np.testing.assert_allclose(values, alone(error), rtol=1e-4, atol=1e-4)  # a gain that is held: `SETTLED`
-        np.testing.assert_allclose(logs, alone.logs, rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(values, alone(error), rtol=1e-6, atol=1e-6)  # a gain that is held: `SETTLED`
+        np.testing.assert_allclose(logs, alone.logs, rtol=1e-6, atol=1e-6)
