@@ -21,8 +21,8 @@ from estimator.lanes import LANES, as_lanes, borrowed, broadcast_as
 from estimator.signals.record import BoolArray, FloatArray, IntArray
 
 SETTLED = 1e-9
-"""Relative change of every state's variance from sample to sample below which the gain no longer changes. What is yet to
-come adds up over the slowest state's time, and filters side by side, by which sizes are estimated, never hold a gain."""
+"""Relative change of every state's variance from sample to sample below which the gain no longer changes. What is yet
+to come adds up over the slowest state's time; filters side by side, by which sizes are estimated, never hold a gain."""
 
 
 class Terms(NamedTuple):
