@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from estimator.diagnosis.first_use import signatures
 from tests.benchmarks.ratios import machine
@@ -38,13 +38,17 @@ def seconds(masses: int, name: str) -> float:
 
 def main(say: Callable[[str], None] = print) -> None:
     """Print the table."""
-    names = [kernel.__name__ for kernel in signatures(MASSES[0])]
-    rows = {name: [seconds(masses, name) for masses in MASSES] for name in names}
-    rows["all"] = [sum(column) for column in zip(*rows.values(), strict=True)]
     say(machine())
     say("| kernel | two masses | three | one |\n| --- | --- | --- | --- |")
-    for name, row in rows.items():
-        say(f"| `{name}` | " + " | ".join(f"{each:.1f} s" for each in row) + " |")
+    rows = []
+    for kernel in signatures(MASSES[0]):
+        rows.append([seconds(masses, kernel.__name__) for masses in MASSES])
+        say(_row(f"`{kernel.__name__}`", rows[-1]))
+    say(_row("all", [sum(column) for column in zip(*rows, strict=True)]))
+
+
+def _row(name: str, times_s: Sequence[float]) -> str:
+    return f"| {name} | " + " | ".join(f"{each:.1f} s" for each in times_s) + " |"
 
 
 if __name__ == "__main__":

@@ -63,6 +63,9 @@ DECAY_PER_STEP, RADIANS_ON_CURVE = 1.0, 0.6
 be steeper than a secant."""
 
 
+PARAMETERS = 10  # which of what ``integrate_made`` takes behind the line are its parameters
+
+
 class Feed(NamedTuple):
     """What is known of a torque's way before it begins."""
 
@@ -332,27 +335,9 @@ def integrate(
 
 
 @compiled_with_lock
-def integrate_period(
-    masses: Masses,
-    own: tuple[Any, ...],
-    sample_time_s: float,
-    substeps: int,
-    sign_width: float,
-    first: int,
-    last: int,
-    start_s: float,
-    torque: FloatArray,
-    load: FloatArray,
-    angle: FloatArray,
-    followed: FloatArray,
-    p: FloatArray,
-    state: FloatArray,
-    outputs: IntArray,
-    sensor: bool,
-    out: FloatArray,
-    slopes: FloatArray,
-) -> None:
-    """Do what ``integrate`` does for one line, for a rig that is stepped period by period."""
-    steps = (sample_time_s, substeps, sign_width, first, last, start_s)
-    driven, found = (torque, load, angle, followed, p, state), (outputs, sensor, out, slopes)
-    call_specialised(len(masses), own, integrate_made, p, (*steps, *driven, *found))
+def integrate_period(masses: Masses, own: tuple[Any, ...], *given: Any) -> None:
+    """Do what ``integrate`` does for one line, for a rig that is stepped period by period.
+
+    ``given`` is what ``integrate_made`` takes behind the line.
+    """
+    call_specialised(len(masses), own, integrate_made, given[PARAMETERS], given)

@@ -29,7 +29,6 @@ from estimator.physics.kernel.state_vector import (
     State,
     pack,
     unpacked,
-    unpacked_row,
 )
 from estimator.physics.laws import BEYOND, dry_friction
 from estimator.physics.layout import slot
@@ -140,21 +139,21 @@ def summed(line: Line, to: FloatArray, now: Conditions, torque: float, rise: flo
         torque -= dry_friction(x.speed, now.dry_motor, now.width_motor)
     load = now.load + dry_at_load(carried, now)
     after = State(0.0, 0.0, 0.0, 0.0, x.vehicle_speed, 0.0, 0.0, 0.0, 0.0, x.traction, no_states(0.0))
-    after = advanced(line, after, unpacked_row(to, TO_TORQUE), torque)
-    after = advanced(line, after, unpacked_row(to, TO_LOAD), load)
+    after = advanced(line, after, unpacked(to[TO_TORQUE]), torque)
+    after = advanced(line, after, unpacked(to[TO_LOAD]), load)
     if rise != 0.0:
-        after = advanced(line, after, unpacked_row(to, TO_RISE), rise)
-    after = advanced(line, after, unpacked_row(to, ANGLE), x.angle)
-    after = advanced(line, after, unpacked_row(to, SPEED), x.speed)
+        after = advanced(line, after, unpacked(to[TO_RISE]), rise)
+    after = advanced(line, after, unpacked(to[ANGLE]), x.angle)
+    after = advanced(line, after, unpacked(to[SPEED]), x.speed)
     if line.masses > 1:
-        after = advanced(line, after, unpacked_row(to, TWIST), x.twist)
-        after = advanced(line, after, unpacked_row(to, LOAD_SPEED), x.load_speed)
+        after = advanced(line, after, unpacked(to[TWIST]), x.twist)
+        after = advanced(line, after, unpacked(to[LOAD_SPEED]), x.load_speed)
     if line.masses == 3:
-        after = advanced(line, after, unpacked_row(to, MIDDLE_TWIST), x.middle_twist)
-        after = advanced(line, after, unpacked_row(to, MIDDLE_SPEED), x.middle_speed)
+        after = advanced(line, after, unpacked(to[MIDDLE_TWIST]), x.middle_twist)
+        after = advanced(line, after, unpacked(to[MIDDLE_SPEED]), x.middle_speed)
     if line.extended:
-        after = advanced(line, after, unpacked_row(to, BRANCH_TWIST), x.branch_twist)
-        after = advanced(line, after, unpacked_row(to, BRANCH_SPEED), x.branch_speed)
+        after = advanced(line, after, unpacked(to[BRANCH_TWIST]), x.branch_twist)
+        after = advanced(line, after, unpacked(to[BRANCH_SPEED]), x.branch_speed)
         for i in range(LAW_STATES):
-            after = advanced(line, after, unpacked_row(to, FIRST_LAW + i), x.law_states[i])
+            after = advanced(line, after, unpacked(to[FIRST_LAW + i]), x.law_states[i])
     return after

@@ -69,15 +69,6 @@ unpacked: Callable[[FloatArray], State] = written(
 )
 """The kernel's state vector, shape (STATES,), as a named tuple."""
 
-unpacked_row: Callable[[FloatArray, int], State] = written(
-    "unpacked_row",
-    {"states": FloatArray, "row": int},
-    State,
-    [f"return State({', '.join(f'states[row, {i}]' for i in _LINE)}, {several(f'states[row, {i}]' for i in _LAWS)})"],
-    {"__name__": __name__, "State": State},
-)
-"""A row of several state vectors, shape (R, STATES), as a named tuple: a view of it would be counted in each step."""
-
 pack: Callable[[State, FloatArray], None] = written(
     "pack",
     {"x": State, "state": FloatArray},
