@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from estimator.physics.driveline import EffectValue, Structure
 from estimator.physics.effect import MOMENTS, Effect
-from estimator.physics.effects import drag, dry_friction, inertia, load, sensor, shaft, timing, torque
+from estimator.physics.effects import drag, dry_friction, inertia, load, periodic, sensor, shaft, timing, torque
 from estimator.physics.own_law import LawName
 from estimator.physics.tables import PREFIX, TABLES, table_faults, table_of
 
@@ -21,7 +21,7 @@ _ENTRIES = (
     torque.TORQUE_BIAS,
     timing.ACTUATOR_LAG,
     timing.TRANSPORT_DELAY,
-    torque.TORQUE_RIPPLE,
+    periodic.TORQUE_RIPPLE,
     dry_friction.COULOMB_FRICTION_MOTOR,
     dry_friction.STRIBECK_FRICTION,
     drag.QUADRATIC_FRICTION,
@@ -34,14 +34,14 @@ _ENTRIES = (
     shaft.SHAFT_HYSTERESIS,
     shaft.VISCOELASTIC_SHAFT,
     drag.GEAR_LOSSES,
-    shaft.CARDAN_SECOND_ORDER,
+    periodic.CARDAN_SECOND_ORDER,
     inertia.EXTRA_TORSIONAL_MODE,
     dry_friction.COULOMB_FRICTION_LOAD,
     drag.AERODYNAMIC_DRAG,
     load.ROAD_GRADE,
     dry_friction.BRAKE_DRAG,
     load.TYRE_SLIP,
-    load.LOAD_IMBALANCE,
+    periodic.LOAD_IMBALANCE,
     load.GRAVITY,
     load.GROUNDED_SPRING,
     inertia.INERTIA_CHANGE,

@@ -2,8 +2,8 @@
 
 A missing effect is a constraint of the superset model to release: at ``null`` its law does nothing. A law
 that acts at a `Place` is taken into the one kernel from its entry. Written into the kernel is what gives the line
-another mass, has faces that meet, or comes between the samples, and how dry friction is near rest; next to it, what
-each inverter's torque is. Everything else about a law stands in its entry.
+another mass, has faces that meet, or comes between the samples, and how dry friction is near rest. Everything else
+about a law stands in its entry.
 """
 
 from __future__ import annotations
@@ -29,13 +29,14 @@ WITH_SPRING = WITH_SHAFT | {Structure.JOINT}  # structures with a shaft, between
 class Place(Enum):
     """Where a law acts, and so what it is given before its parameters, and what it returns.
 
-    All but those of the recorded torque are compiled: for one simulation and, but for `SENSOR`, for several side by
+    All but those of the recorded torques are compiled: for one simulation and, but for `SENSOR`, for several side by
     side (``estimator.lanes``). Where several laws act at one place their torques add up; a law that is given a value of
     the line, a twist or a reading returns what it makes of it, and the next one takes that. Torques in Nm, angles in
     rad, speeds in rad/s; a time is that since the start at which a step begins, and a length the step's [s].
     """
 
-    TORQUE = "torque"  # recorded torque and time since the start, (N,) each -> torque that acts
+    INVERTER = "inverter"  # recorded torque of one inverter, its number from 0 on -> torque that acts
+    TORQUE = "torque"  # torque of all inverters and time since the start, (N,) each -> torque that acts
     DRIVE_ANGLE = "drive_angle"  # recorded angle of the motor -> torque at the motor, share of the drive's own torque
     MOTOR = "motor"  # speed -> torque against the motion
     MOTOR_DRY = "motor_dry"  # speed -> size of a dry friction that slides: even in the speed, largest at rest
@@ -74,6 +75,11 @@ class Acting:
     place: Place  # where along the line
     law: Callable[..., Any]  # compiled; returns a torque [Nm] or what the place says
     rate: Callable[..., Any] | None = None  # compiled; returns the rate of the law's state [1/s times its unit]
+    of_sum: Callable[..., Any] | None = None  # of an inverter's law: torque of all -> torque that acts
+    course: Callable[..., Any] | None = None
+    """Of a law of the torque with a state, which it is given behind the time: torque and time since the start, (N,)
+    each, the sampling period and the state that it begins with -> its states and the one behind the last, (N + 1,). It
+    begins with the parameter that outlasts a recording."""
 
 
 class Element(Enum):

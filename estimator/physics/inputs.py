@@ -13,101 +13,90 @@ from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.curve import MOST_KNOTS, VALUES, curve_over
 from estimator.physics.driveline import Case, InitialCondition
-from estimator.physics.effect import Place
-from estimator.physics.effects.torque import EDGE
+from estimator.physics.effect import Acting, Place
 from estimator.physics.kernel import conditions, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.kernel.laws_at import load_lasting, motor_sliding, resolved
 from estimator.physics.layout import LOAD, slot
 from estimator.signals.record import MOST_BYTES, FloatArray, IntArray, Record, once
 
-_GAIN_M1 = slot("inverter_gain_mismatch", "gain_m1")
-_GAIN_M2 = slot("inverter_gain_mismatch", "gain_m2")
-_LIMIT_M1 = slot("torque_saturation", "limit_m1_nm")
-_LIMIT_M2 = slot("torque_saturation", "limit_m2_nm")
-_SHARPNESS = slot("torque_saturation", "sharpness")
-_LIMIT_SUM = slot("torque_saturation", "limit_sum_nm")
-_DEPTH = slot("torque_derating", "depth")
-_DERATING_TIME = slot("torque_derating", "time_constant_s")
-_HEATED = slot("torque_derating", "heating_nm")
-_WARM = slot("torque_derating", "warm")
-DECLARED = [
-    (e.acting.law, [slot(e.name, each.name) for each in e.parameters], e.parameters[0].null)
-    for e in BUILT_IN.values()
-    if e.acting is not None and e.acting.place is Place.TORQUE
-]
-"""Laws of entries at this place, where their parameters are, and at which value of the first they do nothing."""
-
-_WRITTEN = [_GAIN_M1, _GAIN_M2, _LIMIT_M1, _LIMIT_M2, _SHARPNESS, _LIMIT_SUM, _DEPTH, _DERATING_TIME, _HEATED, _WARM]
-_TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
-_PATH = np.array([*_WRITTEN, *(place for _, places, _ in DECLARED for place in places), *_TABLE])
-"""Where all stands that ``shaft_torque`` depends on."""
-
 MOST_KEPT = 2  # torques that are kept: that of a fit, and one with something moved
 
-
-def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
-    """Return a torque that stops at a limit [Nm], at an edge or in a knee: ``T / (1 + |T/L|^n)^(1/n)``."""
-    if not np.isfinite(limit):
-        return torque
-    if sharpness >= EDGE:
-        return np.clip(torque, -limit, limit)
-    ratio = np.abs(torque) / limit
-    small, large = np.minimum(ratio, 1.0), np.maximum(ratio, 1.0)
-    size = np.where(
-        ratio <= 1.0,
-        small / (1.0 + small**sharpness) ** (1.0 / sharpness),
-        (1.0 + large**-sharpness) ** (-1.0 / sharpness),
-    )
-    return np.asarray(np.copysign(limit * size, torque))
+_TABLE = range(slots.TABLE_TORQUE, slots.TABLE_TORQUE + VALUES + MOST_KNOTS)
+"""Where a curve over the torque stands."""
 
 
-def warmth(torque: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float) -> FloatArray:
-    """Return how warm the windings are when each row begins and after the last, 1 at the full loss; (N + 1,).
+class TorqueLaw(NamedTuple):
+    """What an entry declares for the torque before it reaches the shaft."""
 
-    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
-    each period; ``begun`` is the first row's then.
-    """
-    if p[_HEATED] <= 0.0:
-        rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
-        return np.asarray(1.0 - (1.0 - p[_WARM]) * np.exp(-rows_and_end / p[_DERATING_TIME]))
-    from scipy.signal import lfilter  # half a second that few need
+    acting: Acting  # the law
+    at: list[int]  # where its parameters are
+    sizes: list[int]  # where those are of which each does something by itself
+    nulls: FloatArray  # at which values of these it does nothing
+    begins: int  # where that is which its state begins with, if it has one
 
-    kept = float(np.exp(-period_s / p[_DERATING_TIME]))
-    heat = (1.0 - kept) * (torque / p[_HEATED]) ** 2
-    warm, _ = lfilter([1.0], [1.0, -kept], heat, zi=[kept * begun])
-    return np.concatenate([[begun], warm])
+    def is_on(self, p: FloatArray) -> bool:
+        """Tell whether it does anything."""
+        return bool((p[self.sizes] != self.nulls).any())
+
+
+def _declared(place: Place) -> list[TorqueLaw]:
+    return [
+        TorqueLaw(
+            entry.acting,
+            [slot(entry.name, each.name) for each in entry.parameters],
+            [slot(entry.name, size) for size in entry.sizes],
+            np.array([each.null for each in entry.parameters if each.name in entry.sizes]),
+            next((slot(entry.name, each.name) for each in entry.parameters if each.outlasts), 0),
+        )
+        for entry in BUILT_IN.values()
+        if entry.acting is not None and entry.acting.place is place
+    ]
+
+
+OF_INVERTERS = _declared(Place.INVERTER)
+OF_TORQUE = [law for law in _declared(Place.TORQUE) if law.acting.course is None]
+WITH_COURSE = [law for law in _declared(Place.TORQUE) if law.acting.course is not None]
+"""Laws of the torque in the order in which they act, behind those of each inverter and of their sum; between the two a
+curve over the torque. The state of the last ones begins, in each recording, with the parameter that outlasts one."""
+
+_PATH = np.array([*(place for law in (*OF_INVERTERS, *OF_TORQUE, *WITH_COURSE) for place in law.at), *_TABLE])
+"""Where all stands that ``shaft_torque`` depends on."""
+
+
+def begun_states(p: FloatArray) -> FloatArray:
+    """Return the states of the torque's laws that have one as a recording begins, shape (M,)."""
+    return np.array([p[law.begins] for law in WITH_COURSE])
 
 
 def shaft_torque(torque_nm: FloatArray, since_start_s: FloatArray, p: FloatArray) -> FloatArray:
     """Return the torque on the motor shaft, shape (N,) [Nm], of a recording; see ``shaft_torque_from``."""
     period_s = float(since_start_s[1] - since_start_s[0]) if since_start_s.size > 1 else 0.0
-    return shaft_torque_from(torque_nm, since_start_s, period_s, p, float(p[_WARM]))[0]
+    return shaft_torque_from(torque_nm, since_start_s, period_s, p, begun_states(p))[0]
 
 
 def shaft_torque_from(
-    torque_nm: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: float
-) -> tuple[FloatArray, float]:
-    """Return the torque on the motor shaft, shape (N,) [Nm], and how warm the windings are behind it."""
-    gains = np.array([p[_GAIN_M1], p[_GAIN_M2]])
-    if (gains != 1.0).any():
-        torque_nm = torque_nm.copy()
-        count = min(torque_nm.shape[1], gains.size)
-        torque_nm[:, :count] *= gains[:count]
-    limits = np.array([p[_LIMIT_M1], p[_LIMIT_M2]])[: torque_nm.shape[1]]
-    if np.isfinite(limits).any():
-        columns = [limited(torque, limit, p[_SHARPNESS]) for torque, limit in zip(torque_nm.T, limits, strict=False)]
-        torque_nm = np.column_stack([*columns, torque_nm[:, limits.size :]])
-    total: FloatArray = limited(functools.reduce(np.add, torque_nm.T), p[_LIMIT_SUM], p[_SHARPNESS])
-    for law, places, null in DECLARED:
-        if p[places[0]] != null:
-            total = law(total, since_start_s, *p[places])
+    torque_nm: FloatArray, since_start_s: FloatArray, period_s: float, p: FloatArray, begun: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the torque on the motor shaft, shape (N,) [Nm], and the states (M,) of its laws behind it."""
+    torques, ended = list(torque_nm.T), begun.copy()
+    on = [law for law in OF_INVERTERS if law.is_on(p)]
+    for law in on:
+        torques = [law.acting.law(torque, i, *p[law.at]) for i, torque in enumerate(torques)]
+    total: FloatArray = functools.reduce(np.add, torques)
+    for law in on:
+        if law.acting.of_sum is not None:
+            total = law.acting.of_sum(total, *p[law.at])
+    for law in OF_TORQUE:
+        if law.is_on(p):
+            total = law.acting.law(total, since_start_s, *p[law.at])
     if p[slots.TABLE_TORQUE] > 0.0:
         total = total + curve_over(total, p, slots.TABLE_TORQUE)
-    if p[_DEPTH] == 0.0:
-        return total, 0.0
-    warm = warmth(total, since_start_s, period_s, p, begun)
-    return total * (1.0 - p[_DEPTH] * warm[:-1]), float(warm[-1])
+    for i, law in enumerate(WITH_COURSE):
+        if law.acting.course is not None and law.is_on(p):
+            states = law.acting.course(total, since_start_s, period_s, begun[i], *p[law.at])
+            total, ended[i] = law.acting.law(total, since_start_s, states[:-1], *p[law.at]), states[-1]
+    return total, ended
 
 
 class _Kept:

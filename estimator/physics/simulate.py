@@ -15,7 +15,7 @@ from estimator.physics import catalogue, joint
 from estimator.physics.driveline import Case, InitialCondition
 from estimator.physics.effect import Element
 from estimator.physics.effects.timing import TRANSPORT_DELAY
-from estimator.physics.inputs import initial_state, inputs_of, load_of, shaft_torque_from
+from estimator.physics.inputs import begun_states, initial_state, inputs_of, load_of, shaft_torque_from
 from estimator.physics.kernel import integration, sensing, side_by_side, state_vector
 from estimator.physics.kernel.integration import Masses
 from estimator.physics.layout import OBSERVER, Grid, flat, slot, substeps_for
@@ -358,7 +358,7 @@ class Stepper:
         self._substeps = FINER * substeps_for(model.values(), period_s)
         history = int(np.ceil(self._p[slot(TRANSPORT_DELAY.name, "delay_s")] / period_s)) + 2
         self._steps = 0
-        self._warmth = float(self._p[slot("torque_derating", "warm")])
+        self._states_of_torque = begun_states(self._p)
         self._torque = np.zeros(history)
         self._load = np.full(history, load_torque_nm)
         self._angle = np.zeros(history)
@@ -385,7 +385,9 @@ class Stepper:
         """Let the torque of each input [Nm] act for one period."""
         now = np.array([self._steps * self._period_s])
         self._torque[:-1] = self._torque[1:]
-        on_shaft, self._warmth = shaft_torque_from(np.array([torque_nm]), now, self._period_s, self._p, self._warmth)
+        on_shaft, self._states_of_torque = shaft_torque_from(
+            np.array([torque_nm]), now, self._period_s, self._p, self._states_of_torque
+        )
         self._torque[-1] = on_shaft[0]
         self._angle[-1] = self._read_angle()
         self._angle[-2] = self._angle[-1] - self._state[state_vector.SPEED] * self._period_s  # it goes straight on

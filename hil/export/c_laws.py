@@ -133,7 +133,7 @@ class _Function:
         self._given = {each.arg: hints[each.arg] for each in self._node.args.args}
         self._names = dict(self._given)
         where = f"{inspect.getsourcefile(function)}, {function.__name__}"
-        self._of = Expressions(unit, function.__globals__, self._names, where)
+        self._of = Expressions(unit, function.__globals__, self._names, where, of_one_number)
         self._temporaries = 0
         for kind in (*self._given.values(), self.returned):
             if kind not in (float, int, bool, FloatArray, type(None)):
@@ -242,8 +242,11 @@ class NotTranslatable(ValueError):
 class Expressions:
     """Translates expressions in the scope of one function."""
 
-    def __init__(self, unit: Translation, scope: dict[str, Any], names: dict[str, Type], where: str) -> None:
+    def __init__(
+        self, unit: Translation, scope: dict[str, Any], names: dict[str, Type], where: str, of_one_number: bool
+    ) -> None:
         self._unit, self._scope, self.names, self._where = unit, scope, names, where
+        self._of_one_number = of_one_number  # and so is whatever is called
 
     def refused(self, node: ast.AST) -> NotTranslatable:
         """Return the error that names what can't be translated."""
@@ -382,5 +385,5 @@ class Expressions:
     def _called(self, function: Callable[..., Any], arguments: str, node: ast.Call) -> Text:
         if not callable(function) or not getattr(function, "__module__", "").startswith("estimator."):
             raise self.refused(node)
-        name, kind = self._unit.function(function)
+        name, kind = self._unit.function(function, self._of_one_number)
         return f"{name}({arguments})", kind

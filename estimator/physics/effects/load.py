@@ -22,8 +22,8 @@ from estimator.physics.effect import (
     Place,
     Untestable,
 )
-from estimator.physics.laws import hyperbolic_tangent, overtoned_wave
-from estimator.physics.motion import goes_round, range_of, speed_scale, torque_scale
+from estimator.physics.laws import hyperbolic_tangent
+from estimator.physics.motion import range_of, speed_scale, torque_scale
 from estimator.signals.record import FloatArray, Record
 
 # Road grade: a load torque that wanders slowly over a recording, as the road goes up and down.
@@ -85,51 +85,6 @@ ROAD_GRADE = Effect(
     testable=grade_testable,
     text="the load torque varies slowly by {grade_rms_nm:.3g} {unit[torque]} (rms), as on a road with grades",
     profile=True,
-)
-
-
-# An unbalanced, a little oval wheel: a load torque once and twice per wheel turn.
-
-
-@compiled
-def imbalance_law(angle: float, amplitude: float, turns: float, in_step: float, across: float, phase: float) -> float:
-    """Return ``A (cos(x) + a cos(2 x) + b sin(2 x))``, ``x = phi_M / i + alpha`` [Nm], against the load."""
-    return overtoned_wave(amplitude, angle / turns, phase, in_step, across)
-
-
-def imbalance_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need a known gear ratio, and a load that makes more than a whole turn."""
-    if model.gear_ratio is None:
-        reason = "the model file has no [geometry] gear_ratio: the wheel's angle is unknown"
-        return Untestable(reason, "reversal", needs="gear_ratio in the model file's [geometry]")
-    if not goes_round(records, model.gear_ratio):
-        return Untestable("the load makes less than a whole turn: nothing recurs with its angle", "reversal")
-    return None
-
-
-LOAD_IMBALANCE = Effect(
-    name="load_imbalance",
-    element=Element.LOAD,
-    title="imbalance of the load",
-    law="T_load = T_0 + A (cos(x) + a cos(2 x) + b sin(2 x)), x = phi_M / i + alpha",
-    source="Genta, Dynamics of Rotating Systems, Springer 2005",
-    excited_by="speeds at which the wheel's turn is felt",
-    parameters=(
-        EffectParameter("amplitude_nm", "torque", 0.0, 0.0, 100.0, "amplitude A"),
-        EffectParameter("motor_turns_per_turn", "", 1.0, 0.01, 100.0, "motor turns per turn of the load: i", True),
-        EffectParameter("overtone_in_step", "", 0.0, -5.0, 5.0, "twice per turn, as a share of A: a", True),
-        EffectParameter("overtone_across", "", 0.0, -5.0, 5.0, "the same a quarter of its turn on: b", True),
-        EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha, of each recording", True, True),
-    ),
-    acting=Acting(Place.RECORDED_ANGLE, imbalance_law),
-    structures=EVERY_LINE,
-    resembles=("torque_ripple", "cardan_second_order", "road_grade"),
-    phases={"phase_rad": "amplitude_nm"},
-    scales=lambda _model, records: (0.05 * torque_scale(records), 1.0, 0.1, 0.1),
-    starts=lambda model, _records: [(0.5, Held(model.gear_ratio or 1.0), 0.0, 0.0)],
-    testable=imbalance_testable,
-    text="the load torque swings by {amplitude_nm:.3g} {unit[torque]} once per wheel turn",
-    waving=True,
 )
 
 

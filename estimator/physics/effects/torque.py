@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from estimator.compiled import compiled
 from estimator.physics.driveline import Driveline, Load, Motion, unit
 from estimator.physics.effect import (
     EVERY_LINE,
@@ -21,13 +20,10 @@ from estimator.physics.effect import (
     Place,
     Untestable,
 )
-from estimator.physics.laws import overtoned_wave
 from estimator.physics.motion import (
-    goes_round,
     largest_torque,
     longest_s,
     shares_differ,
-    speed_sweeps,
     torque_reverses,
     torque_scale,
 )
@@ -48,8 +44,10 @@ SPREAD = 0.3  # share of the largest torque by which its size must differ: about
 
 LEAST_S = 8.0  # a drift shows in recordings of this length: in less it is the noise of the reading
 
-ORDERS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 18, 20, 24, 30, 36, 48)
-"""Periods per motor turn that are tried: pole pairs and slots of usual machines, and their small multiples."""
+
+def gain_law(torque: FloatArray, inverter: int, gain_m1: float, gain_m2: float) -> FloatArray:
+    """Return the torque of an inverter that acts [Nm]; of a third one its reading."""
+    return torque * (gain_m1 if inverter == 0 else gain_m2 if inverter == 1 else 1.0)
 
 
 def gain_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
@@ -91,6 +89,8 @@ INVERTER_GAIN_MISMATCH = Effect(
         EffectParameter("gain_m1", "", 1.0, 0.3, 3.0, "true torque of inverter M1 over its reading: g_1", True),
         EffectParameter("gain_m2", "", 1.0, 0.3, 3.0, "true torque of inverter M2 over its reading: g_2", True),
     ),
+    either=("gain_m1", "gain_m2"),
+    acting=Acting(Place.INVERTER, gain_law),
     structures=EVERY_LINE,
     resembles=("torque_derating", "torque_saturation"),
     scales=lambda _model, _records: (1.0, 1.0),
@@ -103,6 +103,45 @@ INVERTER_GAIN_MISMATCH = Effect(
 
 
 # The true torque falls behind its reading as magnets and windings warm.
+
+
+def warmth(
+    torque: FloatArray,
+    since_start_s: FloatArray,
+    period_s: float,
+    begun: float,
+    _depth: float,
+    time_constant_s: float,
+    heating: float,
+    warm: float,
+) -> FloatArray:
+    """Return how warm the windings are when each row begins and after the last, 1 at the full loss; (N + 1,).
+
+    By time alone, or, where they are heated, by the torque's own losses: ``tau dh/dt + h = (T / T_n)^2``, held over
+    each period; ``begun`` is the first row's then.
+    """
+    if heating <= 0.0:
+        rows_and_end = np.append(since_start_s, since_start_s[-1] + period_s)
+        return np.asarray(1.0 - (1.0 - warm) * np.exp(-rows_and_end / time_constant_s))
+    from scipy.signal import lfilter  # half a second that few need
+
+    kept = float(np.exp(-period_s / time_constant_s))
+    heat = (1.0 - kept) * (torque / heating) ** 2
+    states, _ = lfilter([1.0], [1.0, -kept], heat, zi=[kept * begun])
+    return np.concatenate([[begun], states])
+
+
+def derating_law(
+    torque: FloatArray,
+    _since_start_s: FloatArray,
+    state: FloatArray,
+    depth: float,
+    _time_constant_s: float,
+    _heating: float,
+    _warm: float,
+) -> FloatArray:
+    """Return ``T (1 - d h)``, the torque that acts [Nm]."""
+    return np.asarray(torque * (1.0 - depth * state))
 
 
 def derating_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -154,6 +193,7 @@ TORQUE_DERATING = Effect(
             "warm", "", 0.0, 0.0, 1.0, "share of d as a recording begins: h_0", True, True, most=1, outlasts=True
         ),
     ),
+    acting=Acting(Place.TORQUE, derating_law, course=warmth),
     structures=EVERY_LINE,
     resembles=("inverter_gain_mismatch", "road_grade", "warming_friction"),
     scales=derating_scales,
@@ -166,6 +206,36 @@ TORQUE_DERATING = Effect(
 
 
 # The true torque stops at a limit that its reading passes.
+
+
+def limited(torque: FloatArray, limit: float, sharpness: float) -> FloatArray:
+    """Return a torque that stops at a limit [Nm], at an edge or in a knee: ``T / (1 + |T/L|^n)^(1/n)``."""
+    if not np.isfinite(limit):
+        return torque
+    if sharpness >= EDGE:
+        return np.clip(torque, -limit, limit)
+    ratio = np.abs(torque) / limit
+    small, large = np.minimum(ratio, 1.0), np.maximum(ratio, 1.0)
+    size = np.where(
+        ratio <= 1.0,
+        small / (1.0 + small**sharpness) ** (1.0 / sharpness),
+        (1.0 + large**-sharpness) ** (-1.0 / sharpness),
+    )
+    return np.asarray(np.copysign(limit * size, torque))
+
+
+def limit_law(
+    torque: FloatArray, inverter: int, limit_m1: float, limit_m2: float, _limit_sum: float, sharpness: float
+) -> FloatArray:
+    """Return the torque of an inverter that acts [Nm]; of a third one its reading."""
+    return limited(torque, limit_m1 if inverter == 0 else limit_m2 if inverter == 1 else math.inf, sharpness)
+
+
+def limit_of_sum(
+    torque: FloatArray, _limit_m1: float, _limit_m2: float, limit_sum: float, sharpness: float
+) -> FloatArray:
+    """Return the torque of all inverters that acts [Nm]."""
+    return limited(torque, limit_sum, sharpness)
 
 
 def saturation_scales(model: Driveline, records: Sequence[Record]) -> tuple[float, ...]:
@@ -210,6 +280,8 @@ TORQUE_SATURATION = Effect(
         EffectParameter("limit_sum_nm", "torque", math.inf, 0.05, 1.2, "limit of the sum: L", True),
         EffectParameter("sharpness", "", EDGE, 2.0, EDGE, "sharpness of the knee: n", True, form="soft"),
     ),
+    either=("limit_m1_nm", "limit_m2_nm", "limit_sum_nm"),
+    acting=Acting(Place.INVERTER, limit_law, of_sum=limit_of_sum),
     structures=EVERY_LINE,
     resembles=("inverter_gain_mismatch", "stiffness_nonlinearity"),
     scales=saturation_scales,
@@ -269,6 +341,7 @@ TORQUE_NONLINEARITY = Effect(
         EffectParameter("asymmetry_per_nm", "per_torque", 0.0, -6.0, 6.0, "more for positive torque: e", True),
     ),
     example={"curvature_per_nm": 8e-4, "asymmetry_per_nm": 3e-4},
+    either=("curvature_per_nm", "asymmetry_per_nm"),
     acting=Acting(Place.TORQUE, nonlinearity_law),
     structures=EVERY_LINE,
     resembles=("torque_saturation", "inverter_gain_mismatch", "stiffness_nonlinearity"),
@@ -338,87 +411,4 @@ TORQUE_BIAS = Effect(
     testable=bias_testable,
     text=bias_sentence,
     linear=True,
-)
-
-
-# A torque ripple whose frequency follows the motor's speed.
-
-
-@compiled
-def ripple_law(
-    angle: float,
-    amplitude: float,
-    share: float,
-    order: float,
-    in_step: float,
-    across: float,
-    phase: float,
-    share_phase: float,
-) -> tuple[float, float]:
-    """Return the torque of cogging [Nm], and the share of the drive's own torque by which it ripples."""
-    turned = order * angle
-    return (
-        overtoned_wave(amplitude, turned, phase, in_step, across),
-        overtoned_wave(share, turned, share_phase, in_step, across),
-    )
-
-
-def ripple_starts(model: Driveline, records: Sequence[Record]) -> list[FitStart]:
-    """Return two starts per order that machines show, one per cause; the order is a whole number and not fitted.
-
-    One whose period the motor does not pass through once is any law of the angle, such as gravity.
-    """
-    return [
-        start
-        for order in ORDERS
-        if goes_round(records, 1.0 / order)
-        for start in (
-            (0.5, Held(0.0), Held(float(order)), 0.0, 0.0),
-            (Held(0.0), 0.5, Held(float(order)), 0.0, 0.0),
-        )
-    ]
-
-
-def ripple_testable(model: Driveline, records: Sequence[Record]) -> Untestable | None:
-    """Need part of a turn, and a speed that sweeps."""
-    if not goes_round(records, 1.0 / ORDERS[-1]):
-        return Untestable("the motor makes too little of a turn: nothing recurs with its angle", "reversal")
-    if any(speed_sweeps(record) for record in records):
-        return None
-    return Untestable("the speed hardly changes: a ripple away from the resonance does not show", "reversal")
-
-
-def ripple_sentence(values: Mapping[str, float], motion: Motion) -> str:
-    """State size and order of the ripple."""
-    torque = unit("torque", motion)
-    size = f"{values['amplitude_nm']:.3g} {torque}" if values["amplitude_nm"] else f"{values['share']:.2%} of itself"
-    return f"the torque ripples by {size} at {values['order']:.0f} times per motor turn"
-
-
-TORQUE_RIPPLE = Effect(
-    name="torque_ripple",
-    element=Element.TORQUE_PATH,
-    title="torque ripple",
-    law="T = T_read (1 + r w(x)) + A w(x), one of r and A zero, w = cos(x) + a cos(2 x) + b sin(2 x), "
-    "x = n phi_M + alpha",
-    source="cogging and commutation: Jahns, Soong, IEEE Trans. Ind. Electron. 43(2), 1996",
-    excited_by="slow speeds at which n times the speed passes the resonance",
-    parameters=(
-        EffectParameter("amplitude_nm", "torque", 0.0, 0.0, 20.0, "amplitude A, of cogging", True),
-        EffectParameter("share", "", 0.0, 0.0, 20.0, "amplitude as a share of the torque: r", True),
-        EffectParameter("order", "", 6.0, 1.0, 96.0, "periods per motor turn: n"),
-        EffectParameter("overtone_in_step", "", 0.0, -5.0, 5.0, "twice as often, as a share: a", True),
-        EffectParameter("overtone_across", "", 0.0, -5.0, 5.0, "the same a quarter of its turn on: b", True),
-        EffectParameter("phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of A, of each recording", True, True),
-        EffectParameter("share_phase_rad", "rad", 0.0, -10.0, 10.0, "phase alpha of r, of each recording", True, True),
-    ),
-    acting=Acting(Place.DRIVE_ANGLE, ripple_law),
-    structures=EVERY_LINE,
-    resembles=("cardan_second_order", "load_imbalance", "resolver_error"),
-    phases={"phase_rad": "amplitude_nm", "share_phase_rad": "share"},
-    scales=lambda _model, records: (0.05 * torque_scale(records), 0.05, 1.0, 0.1, 0.1),
-    starts=ripple_starts,
-    testable=ripple_testable,
-    text=ripple_sentence,
-    waving=True,
 )

@@ -55,12 +55,6 @@ USED = (
 
 _FROM_SLOTS = ("DELAY", "DELAYED_BEFORE", "LAG", "LAG_SHAPE", "FILTER", "FILTER_SHAPE")
 _OF_THE_PATH = {
-    "GAIN_M1": ("inverter_gain_mismatch", "gain_m1"),
-    "GAIN_M2": ("inverter_gain_mismatch", "gain_m2"),
-    "LIMIT_M1": ("torque_saturation", "limit_m1_nm"),
-    "LIMIT_M2": ("torque_saturation", "limit_m2_nm"),
-    "LIMIT_SHARPNESS": ("torque_saturation", "sharpness"),
-    "LIMIT_SUM": ("torque_saturation", "limit_sum_nm"),
     "DEPTH": ("torque_derating", "depth"),
     "DERATING_TIME": ("torque_derating", "time_constant_s"),
     "HEATED": ("torque_derating", "heating_nm"),
@@ -91,22 +85,41 @@ def laws() -> str:
     unit = Translation()
     for function in USED:
         unit.function(function)
-    unit.function(inputs.limited, of_one_number=True)
     head = "/* The laws of hil, translated from Python. The functions are named after their module. */\n"
     torque = _torque_laws(unit)  # before the text: it asks for functions
     return head + unit.text() + torque
 
 
 def _torque_laws(unit: Translation) -> str:
-    """Return the C function of the laws that entries declare for the torque, one behind the other."""
-    lines = ["static double laws_torque(double torque, double time_s, Array p) {"]
-    for law, at, null in inputs.DECLARED:
-        name, _ = unit.function(law, of_one_number=True)
-        values = ", ".join(["torque", "time_s", *(f"p.at[{place}]" for place in at)])
-        lines.append(f"    if (p.at[{at[0]}] != {_number(null)}) torque = {name}({values});")
+    """Return the C function of the laws that entries declare for the torque, one behind the other.
+
+    Those with a state are not among them: its course over a step is the co-simulation's own (driveline.c).
+    """
+    lines = ["static double laws_torque(double m1, double m2, double time_s, Array p) {"]
+    for law in inputs.OF_INVERTERS:
+        name, _ = unit.function(law.acting.law, of_one_number=True)
+        lines += [
+            f"    if ({_is_on(law)}) {m} = {name}({_called(law, m, str(i))});" for i, m in enumerate(("m1", "m2"))
+        ]
+    lines.append("    double torque = m1 + m2;")
+    for law in inputs.OF_INVERTERS:
+        if law.acting.of_sum is not None:
+            name, _ = unit.function(law.acting.of_sum, of_one_number=True)
+            lines.append(f"    if ({_is_on(law)}) torque = {name}({_called(law, 'torque')});")
+    for law in inputs.OF_TORQUE:
+        name, _ = unit.function(law.acting.law, of_one_number=True)
+        lines.append(f"    if ({_is_on(law)}) torque = {name}({_called(law, 'torque', 'time_s')});")
     name, count = unit.function(curve)[0], slots.TABLE_TORQUE
     lines.append(f"    if (p.at[{count}] > 0.0) torque = torque + {name}(torque, p, {count}, 0).item0;")
     return "\n".join((*lines, "    return torque;", "}", ""))
+
+
+def _is_on(law: inputs.TorqueLaw) -> str:
+    return " || ".join(f"p.at[{at}] != {_number(float(null))}" for at, null in zip(law.sizes, law.nulls, strict=True))
+
+
+def _called(law: inputs.TorqueLaw, *given: str) -> str:
+    return ", ".join([*given, *(f"p.at[{at}]" for at in law.at)])
 
 
 def model_header(d: Driveline, token: str) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from estimator.diagnosis.inference.hypotheses import open_hypotheses
-from estimator.physics import inputs as torque_path
 from estimator.physics.catalogue import EFFECTS
 from estimator.physics.driveline import InitialCondition, Structure
 from estimator.physics.effect import Effect, Element, Held, Place
@@ -120,6 +119,7 @@ def test_the_decisive_parameter_at_its_null_is_no_effect_whatever_the_others_are
     each = {
         "inverter_gain_mismatch",
         "torque_saturation",
+        "torque_nonlinearity",
         "resolver_error",
         "stribeck_friction",
         "extra_torsional_mode",
@@ -161,7 +161,7 @@ def test_every_entry_has_its_law_in_the_simulation(entry: Effect) -> None:
     """What is recognised in the raw data, and a profile over time, have no law there."""
     if entry.profile or entry.element is Element.ACQUISITION:
         return
-    taken = {value for name, value in vars(slots).items() if name.isupper()} | set(torque_path._WRITTEN)
+    taken = {value for name, value in vars(slots).items() if name.isupper()}
     missing = [each.name for each in entry.parameters if slot(entry.name, each.name) not in taken]
     assert entry.acting is not None or not missing, (
         f"{entry.name}: the simulation does not read {', '.join(missing)}. Give the entry acting=Acting(place, law) "
@@ -175,6 +175,9 @@ def test_a_law_has_a_state_where_its_place_has_laws_with_one(entry: Effect) -> N
     if entry.acting is not None:
         allowed = {Place.SHAFT: (True,), Place.MOTOR: (True, False), Place.LOAD: (True, False)}
         assert (entry.acting.rate is not None) in allowed.get(entry.acting.place, (False,))
+        assert entry.acting.course is None or entry.name == "torque_derating"  # driveline.c has no other course
+        assert entry.acting.course is None or any(each.outlasts for each in entry.parameters)
+        assert entry.acting.of_sum is None or entry.acting.place is Place.INVERTER
 
 
 CHANGING = {

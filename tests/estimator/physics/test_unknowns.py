@@ -7,7 +7,7 @@ import pytest
 
 from estimator.physics.driveline import InitialCondition
 from estimator.physics.effect import Held, Within
-from estimator.physics.effects.torque import ORDERS
+from estimator.physics.effects.periodic import ORDERS
 from estimator.physics.fit import fit
 from estimator.physics.free_run import free_run
 from estimator.physics.layout import flat, grid_for, slot

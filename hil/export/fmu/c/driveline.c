@@ -88,10 +88,7 @@ static void passed(const History *past, double before, double begin, double end,
 /* ---- from the inverters' torques to the one on the shaft ---- */
 
 static double summed(Driveline *d) {
-    const double *p = d->value + PARAMETER;
-    double m1 = inputs_limited(d->value[T_M1] * p[GAIN_M1], p[LIMIT_M1], p[LIMIT_SHARPNESS]);
-    double m2 = inputs_limited(d->value[T_M2] * p[GAIN_M2], p[LIMIT_M2], p[LIMIT_SHARPNESS]);
-    return laws_torque(inputs_limited(m1 + m2, p[LIMIT_SUM], p[LIMIT_SHARPNESS]), d->value[TIME], parameters(d));
+    return laws_torque(d->value[T_M1], d->value[T_M2], d->value[TIME], parameters(d));
 }
 
 static double warmth(const Driveline *d) { /* 1: as warm as they get; heated by the torque's losses it is a state */
