@@ -155,13 +155,21 @@ def _limit_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[st
         allowed = least if math.isinf(parameter.most) else f"{least}, up to {parameter.most:g}"
         if value < low or (is_open and value == 0) or value > parameter.most:
             problems.append(f"effects.{entry.name}.{parameter.name}.value: expected a number {allowed}, got {value}")
-    begins, ends = (values[each.name].value if each.name in values else 0.0 for each in MOMENTS)
-    if entry.event and ends < begins:
-        problems.append(
-            f"effects.{entry.name}.{MOMENTS[1].name}.value: expected a moment after {MOMENTS[0].name} = {begins:g}, "
-            f"when it begins, got {ends}"
-        )
-    return problems
+    return problems + (_moment_problems(entry, values) if entry.event else [])
+
+
+def _moment_problems(entry: Effect, values: Mapping[str, EffectValue]) -> list[str]:
+    """Refuse an event that ends before it begins, or of which only the beginning is given."""
+    begin, end = (each.name for each in MOMENTS)
+    begins = values[begin].value if begin in values else 0.0
+    ends = values[end].value if end in values else 0.0
+    if not 0.0 <= ends < begins:  # a negative moment is refused as such
+        return []
+    got = f"got {ends}" if end in values else "which is missing"
+    return [
+        f"effects.{entry.name}.{end}.value: expected a moment that is not before {begin} = {begins}, when it begins, "
+        f"{got}"
+    ]
 
 
 def _table_problems(name: str, values: Mapping[str, EffectValue], structure: Structure) -> list[str]:

@@ -54,19 +54,21 @@ def free_run(model: DrivelineModel, record: Record, known: Own = NOTHING_KNOWN) 
     views = separated_outputs([record], lambda _: 1.0)[1:]
     further = tuple(simulate_each(problem.grid, view, [case])[0] for view in views)
     beyond = beyond_knots(model.effects, problem.grid, record, case, model.motion) if model.plant is None else ()
-    return FreeRun(result.outputs[0], result.rms, whole, further, (*beyond, *ran_away(result.outputs[0], record)))
+    said = (*beyond, *ran_away(result.outputs[0], record, model.effects))
+    return FreeRun(result.outputs[0], result.rms, whole, further, said)
 
 
-def ran_away(output: FloatArray, record: Record) -> tuple[str, ...]:
+def ran_away(output: FloatArray, record: Record, effects: Iterable[str]) -> tuple[str, ...]:
     """Return a sentence on a simulated output, shape (N,), that was held where it ran away; none where it did not."""
     gone = np.abs(output) >= far_away(record)
     if not gone.any():
         return ()
     at_s, most = float(record.time_s[np.argmax(gone)]), float(np.abs(output).max())
+    suspects = "".join(f", {name}" for name in effects)
     return (
         f"{record.name}: the simulation runs away and is held at ±{most:.4g} from {at_s:.4g} s on: its numbers mean "
-        "nothing. Check the model's values: an inertia or a stiffness that an effect leaves at 0 or below, or a law so "
-        "steep that no step can follow it.",
+        f"nothing. Check the model's values (parameters{suspects}): one is so large, stiff, steep or fast that no "
+        "step can follow it.",
     )
 
 

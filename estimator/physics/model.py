@@ -136,7 +136,7 @@ class DrivelineModel:
         line = self.values()
         return [
             f"effects.{name}: expected values that leave {parameter} = {line[parameter]:g} greater than 0, got "
-            f"{', '.join(f'{key} = {each.value:g}' for key, each in values.items())}, which leave {min(spans):g}"
+            f"{', '.join(f'{key} = {each.value}' for key, each in values.items())}, which leave {min(spans):g}"
             for name, values in self.effects.items()
             for parameter, spans in self._spans_with(name, values, line).items()
             if parameter in STRICTLY_POSITIVE and min(spans) <= 0.0
@@ -145,7 +145,11 @@ class DrivelineModel:
     def _spans_with(
         self, name: str, values: Mapping[str, EffectValue], line: Mapping[str, float]
     ) -> dict[str, list[float]]:
-        """Return between what an effect has the line's parameters, by name."""
+        """Return between what an effect has the line's parameters, by name.
+
+        Its values alone are asked: a tolerance and an interval say how little is known, not what a line has, and a fit
+        finds no line beyond.
+        """
         given = {each.name: each.null for each in EFFECTS[name].parameters} | {k: v.value for k, v in values.items()}
         described = EFFECTS[name].described(self, EFFECTS[name].completed(given), line)
         return {parameter: [end for span in spans for end in span] for parameter, spans in described.items()}

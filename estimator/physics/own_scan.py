@@ -172,7 +172,8 @@ class Scan:
 
     def best(self, size: float) -> Stretch:
         """Return the interval in which an event of a size takes most away."""
-        taken = np.triu(-2.0 * size * self.along - size**2 * self.power, 1)
+        with np.errstate(over="ignore"):  # so large an event only adds to the error: -inf
+            taken = np.triu(-size * (2.0 * self.along + size * self.power), 1)
         first, last = np.unravel_index(int(taken.argmax()), taken.shape)
         if taken[first, last] <= 0.0:
             return Stretch(0, 0, 0.0, 0.0, 0.0)

@@ -144,7 +144,8 @@ def _unknown(effect: str, parameter: EffectParameter, scale: float, x: float | H
         return Shared(effect, parameter.name, scale, x.value, x.value, x.value)
     if isinstance(x, Within):
         return Shared(effect, parameter.name, scale, x.low, x.high, x.value)
-    return Shared(effect, parameter.name, scale, parameter.low, parameter.high, x)
+    low, high = max(parameter.low, parameter.least / scale), min(parameter.high, parameter.most / scale)
+    return Shared(effect, parameter.name, scale, low, high, x)  # what a model may hold, and no more
 
 
 def _own_unknowns(entry: Effect, record: Record) -> tuple[Shared, ...]:

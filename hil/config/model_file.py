@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from estimator.errors import BadModel
+from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.model import DrivelineModel, EffectValue, Load, Motion, Parameter, Prior, Structure
 from estimator.physics.own_law import LawName
 from estimator.physics.tables import PLACES, PREFIX, TABLES, table_faults
@@ -33,7 +34,7 @@ EnumKind = TypeVar("EnumKind", bound=Enum)
 Default = TypeVar("Default", float, None)
 
 NEUTRAL = 1.0
-"""Stands for a number of the wrong type while the rest is checked: allowed for every parameter."""
+"""Stands for a number of the wrong type while the rest is checked: allowed for every parameter of a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +183,7 @@ def _model(
             for name, entry in _table(content.get("parameters")).items()
         },
         effects={
-            name: {key: _effect_value(entry) for key, entry in _table(values).items()}
+            name: {key: _effect_value(entry, _null_of(name, key)) for key, entry in _table(values).items()}
             for name, values in _table(content.get("effects")).items()
             if name not in without and name not in TABLES
         }
@@ -257,5 +258,11 @@ def _number(entry: object, key: str, otherwise: Default) -> float | Default:
     return otherwise
 
 
-def _effect_value(entry: object) -> EffectValue:
-    return EffectValue(_number(entry, "value", NEUTRAL), _ends(entry, "ci95"), _number(entry, "tolerance", 0.0))
+def _null_of(effect: str, parameter: str) -> float:
+    """Return the value at which an effect's law does nothing: it stands for a number of the wrong type."""
+    known = BUILT_IN[effect].parameters if effect in BUILT_IN else ()
+    return next((each.null for each in known if each.name == parameter and math.isfinite(each.null)), NEUTRAL)
+
+
+def _effect_value(entry: object, null: float) -> EffectValue:
+    return EffectValue(_number(entry, "value", null), _ends(entry, "ci95"), _number(entry, "tolerance", 0.0))

@@ -56,7 +56,9 @@ def test_a_simulation_that_runs_away_is_reported_by_both_commands(
     with arguments["--model"].open("a") as file:
         file.write("\n[effects.warming_friction]\ncold_nm_s = { value = 1e8 }\ntime_constant_s = { value = 3.0 }\n")
     assert call(arguments) == 0
-    assert "run_1: the simulation runs away" in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert "run_1: the simulation runs away" in message
+    assert "Check the model's values (parameters, warming_friction)" in message
     assert run(["compare", str(arguments["--model"]), str(arguments["--input"])]) == 0
     assert "drive.toml: run_1: the simulation runs away" in capsys.readouterr().err
 

@@ -222,6 +222,7 @@ def test_a_wrong_line_is_refused_by_its_key(tmp_path: Path, line: str, said: str
             "[effects.coulomb_friction_motor]\nfriction_nm = 3",
             "effects.coulomb_friction_motor.friction_nm | expected a table of value, ci95",
         ),
+        ("[effects.clock_drift]\nrate = 3e-4", "effects.clock_drift.rate | expected a table of value, ci95"),
         (
             "[signals]\nspeed = { column = 'v', at = 'roof' }",
             "signals.speed.at | expected 'motor', 'load' or 'shaft' | got 'roof'",

@@ -278,7 +278,9 @@ CLOCK_DRIFT = Effect(
     law="T(t) = T_read((1 + r) t)",
     source="free-running node clocks: CiA 301 (SYNC, TIME); Mills, Computer Network Time Synchronization, 2011",
     excited_by="long recordings with torque steps",
-    parameters=(EffectParameter("rate", "", 0.0, -20.0, 20.0, "relative difference of the rates: r"),),
+    parameters=(
+        EffectParameter("rate", "", 0.0, -20.0, 20.0, "relative difference of the rates: r", least=-0.5, most=0.5),
+    ),
     structures=EVERY_LINE,
     resembles=("transport_delay", "sample_jitter"),
     scales=lambda _model, records: (PARTED_S / longest_s(records),),

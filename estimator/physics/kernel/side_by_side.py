@@ -53,7 +53,11 @@ FEEDING = np.array([slots.DELAY, slots.DELAYED_BEFORE, slots.DRIFT, slots.LAG, s
 
 @compiled
 def can_share_lanes(masses: Masses, p: FloatArray, rows: IntArray) -> bool:
-    """Tell whether simulations can share SIMD lanes: compiled, not linear, the same effects and sub-steps."""
+    """Tell whether simulations can share SIMD lanes: compiled, not linear, the same effects.
+
+    All take the finest sub-steps that any of them needs: a step that differed between the columns of a Jacobian would
+    be a part of their difference.
+    """
     first = p[rows[0]]
     if rows.size == 1 or not IS_COMPILED:
         return False

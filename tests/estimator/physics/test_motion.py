@@ -1,12 +1,13 @@
 """What a recording says of the motion: speed from position, sizes, changes of sign."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.errors import BadModel
-from estimator.physics.model import DrivelineModel, Motion, Parameter, Structure, parameter_unit
+from estimator.physics.model import DrivelineModel, EffectValue, Motion, Parameter, Structure, parameter_unit
 from estimator.physics.motion import (
     measured_speed,
     reverses,
@@ -128,21 +129,33 @@ def test_every_fault_is_reported_at_once() -> None:
         ),
         (
             {"brake_drag": {"brake_nm": 5.0, "from_s": 4.0, "to_s": 3.0}},
-            "effects.brake_drag.to_s.value: expected a moment after from_s = 4, when it begins, got 3.0",
+            "effects.brake_drag.to_s.value: expected a moment that is not before from_s = 4.0, when it begins, got 3",
+        ),
+        (
+            {"brake_drag": {"brake_nm": 5.0, "from_s": 4.0}},
+            "brake_drag.to_s.value: expected a moment .* before from_s = 4.0, when it begins, which is missing",
         ),
         (
             {"inertia_change": {"change_kg_m2": -TWO_MASS["J_L"]}},
-            "effects.inertia_change: expected values that leave J_L = .* greater than 0, got change_kg_m2 = .* leave 0",
+            "effects.inertia_change: expected values that leave J_L = .* than 0, got change_kg_m2 = .* leave 0",
         ),
         (
             {"stiffness_change": {"change": -2.0}},
-            "effects.stiffness_change: expected values that leave k = .* than 0, got change = -2, which leave -",
+            "effects.stiffness_change: expected values that leave k = .* than 0, got change = -2.0, which leave -",
         ),
+        ({"clock_drift": {"rate": -1.0}}, "rate.value: expected a number -0.5 or greater, up to 0.5, got -1.0"),
     ],
 )
 def test_a_wrong_effect_is_refused(effects: dict[str, dict[str, float]], message: str) -> None:
     with pytest.raises(BadModel, match=message):
         model(TWO_MASS, effects=effects)
+
+
+@pytest.mark.parametrize("known", [EffectValue(-0.9, ci95=(-1.1, -0.7)), EffectValue(-0.9, tolerance=0.3)])
+def test_what_is_known_of_an_effect_may_reach_beyond_what_a_line_has(known: EffectValue) -> None:
+    """It says how little is known; a diagnosis moves the value within it, and its file is read again."""
+    effects = {"stiffness_change": {"change": known}}
+    assert "stiffness_change" in replace(model(TWO_MASS), effects=effects).effects
 
 
 def test_a_shaft_effect_makes_no_sense_without_a_shaft() -> None:

@@ -103,6 +103,10 @@ class TestBestStretch:
         assert [found.first, found.last] == rows == [first, last]
         assert found.error_reduction == pytest.approx(taken)
 
+    def test_a_size_whose_square_is_no_number_takes_nothing_away(self) -> None:
+        answers = np.vstack([np.zeros(200), np.cumsum(np.random.default_rng(1).standard_normal((12, 200)), axis=0)])
+        assert scan(answers, answers[3]).best(1e200).error_reduction == 0.0
+
     @pytest.mark.parametrize("seed", range(8))
     def test_what_is_lasting_begins_or_ends_with_the_recording(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
