@@ -108,7 +108,10 @@ class SourceLocator(_CacheLocator):
         return ""
 
 
-vars(numba_config)["CACHE_LOCATOR_CLASSES"] = f"{SourceLocator.__module__}.{SourceLocator.__name__}"
+_settings = vars(numba_config)
+if "NUMBA_OPT" not in os.environ:  # at the third level a simulation takes as long, and a fifth more to compile
+    _settings["OPT"] = type(_settings["OPT"])(2)
+_settings["CACHE_LOCATOR_CLASSES"] = f"{SourceLocator.__module__}.{SourceLocator.__name__}"
 
 compile_undisturbed()
 

@@ -30,7 +30,7 @@ from estimator.physics.model import DrivelineModel
 from estimator.physics.simulate import MASSES, simulate
 from estimator.signals.record import Record
 
-COMPILING = "compiling, once on this machine, for about a minute"
+COMPILING = "compiling, once on this machine, for a minute or two"
 
 _ROW, _ROWS, _STACK, _INDICES = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 _TUPLE: Any = types.UniTuple

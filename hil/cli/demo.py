@@ -47,7 +47,7 @@ def demo(
 ) -> None:
     """Conceal an effect in a simulated rig, find it over CANopen and Modbus, then open the seal.
 
-    The first run compiles for about a minute more. The verdict is written before the seal is opened, and is judged
+    The first run compiles for a minute or two more. The verdict is written before the seal is opened, and is judged
     unchanged.
     """
     hold(out)
