@@ -13,7 +13,7 @@ from estimator.compiled import compiled, inlined
 from estimator.physics.catalogue import BUILT_IN
 from estimator.physics.curve import MOST_KNOTS, VALUES, curve_over
 from estimator.physics.driveline import Case, InitialCondition
-from estimator.physics.effect import Acting, Place
+from estimator.physics.effect import Acting, Effect, Place
 from estimator.physics.kernel import conditions, slots, state_vector
 from estimator.physics.kernel.conditions import branch_frequency, branch_inertia, is_bristled, is_within
 from estimator.physics.kernel.laws_at import load_lasting, motor_sliding, resolved
@@ -41,17 +41,18 @@ class TorqueLaw(NamedTuple):
 
 
 def _declared(place: Place) -> list[TorqueLaw]:
-    return [
-        TorqueLaw(
-            entry.acting,
-            [slot(entry.name, each.name) for each in entry.parameters],
-            [slot(entry.name, size) for size in entry.sizes],
-            np.array([each.null for each in entry.parameters if each.name in entry.sizes]),
-            next((slot(entry.name, each.name) for each in entry.parameters if each.outlasts), 0),
-        )
-        for entry in BUILT_IN.values()
-        if entry.acting is not None and entry.acting.place is place
-    ]
+    return [_law_of(e, e.acting) for e in BUILT_IN.values() if e.acting is not None and e.acting.place is place]
+
+
+def _law_of(entry: Effect, acting: Acting) -> TorqueLaw:
+    sizes = [each for each in entry.parameters if each.name in entry.sizes]
+    return TorqueLaw(
+        acting,
+        [slot(entry.name, each.name) for each in entry.parameters],
+        [slot(entry.name, each.name) for each in sizes],
+        np.array([each.null for each in sizes]),
+        next((slot(entry.name, each.name) for each in entry.parameters if each.outlasts), 0),
+    )
 
 
 OF_INVERTERS = _declared(Place.INVERTER)
